@@ -61,6 +61,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[physics]'
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/hand_over_cell.toml --physics -o out/hand_over_nest
+	$(BIN)/armwright run examples/insert_peg.rlo --cell examples/socket_cell.toml --physics --seed 1 -o out/insert_peg
 	$(BIN)/armwright run examples/stack_by_vision.rlo --cell examples/vision_cell.toml --physics --seed 1 -o out/stack_by_vision
 	$(BIN)/armwright move joint puma560-seed examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
@@ -106,7 +107,8 @@ editor:           ## Build, check and package the VS Code extension (needs npm)
 	cd editors/vscode && npm ci && npm run check && npm run build && npm test && npm run package
 
 fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes under watch (hours; TARGET=cell RUNS=1000)
-	for target in $(or $(FILES),arm linkage urdf mjcf cell mesh poses iso9283 calibration clearance); do \
+	for target in $(or $(FILES),arm linkage urdf mjcf cell world mesh step poses iso9283 calibration clearance pictures corners \
+	    picture_joints lens); do \
 	    $(BIN)/python -W ignore fuzz/files.py $$target $(or $(RUNS),100000) || exit 1; done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	for target in $(or $(TARGET),tokens tree cell code program format); do \

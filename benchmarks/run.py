@@ -23,6 +23,7 @@ ALL = (
     "scaling",
     "latency",
     "simulation",
+    "physics",
     "motion_lines",
     "motion_path",
     "motion_knots",

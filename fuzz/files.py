@@ -1,14 +1,17 @@
 """Fuzzing of what reads files, by changing valid ones: `python fuzz/files.py TARGET [INPUTS] [SEED]`.
 
-Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `mesh`, `poses`, `iso9283`, `calibration` and `clearance`
-(measured tables). It needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and
-cells were changed, lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised,
-when it takes more than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it
-again.
+Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `world` (cells with physics, which are begun), `mesh`, `step`,
+`poses`, `iso9283`, `calibration` and `clearance` (measured tables), `pictures`, `corners`, `picture_joints` and `lens`
+(of a camera). It needs nothing beside armwright; `world`, `step` and `pictures` need its extras.
+
+An input is a valid file in which keys, numbers, types, lines and cells were changed, lost, doubled, nested or put
+elsewhere. It fails when anything but the reader's own error is raised, when it takes more than five seconds, or when
+memory grows beyond 1 GB. The seed and the number of an input make it again.
 """
 
 import base64
 import contextlib
+import io
 import json
 import random
 import re
@@ -22,23 +25,33 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from armwright.accuracy.measurement_file import read_measurements as read_accuracy
-from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.arm.load import load_arm, read_arm
 from armwright.arm.mjcf.reader import load_mjcf
+from armwright.arm.urdf.reader import load_urdf
+from armwright.calibration.board import Board
+from armwright.calibration.camera_tables import read_corners, read_lens, read_picture_joints
 from armwright.calibration.measurements import read_measurements
 from armwright.cell.assembly import read_assembly_frames
+from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import read_clearance_measurements
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
+from armwright.files.pictures import read_grey_picture
 from armwright.motion.poses_file import read_poses
+from armwright.physics.collisions import CellCollisions
 from armwright.physics.mjcf import arm_mjcf
+from armwright.physics.trials import draw_case
+from armwright.physics.world import PhysicsCell
 from armwright.spatial.meshes.reader import read_mesh
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "armwright"
 EXAMPLES = ROOT / "examples"
+STEP_FILES = ROOT / "tests" / "spatial" / "step_files"
 # What stands for a value: of other kinds, of other sizes, and what a careless reader stumbles over.
 VALUES = (
     *("0", "-0.0", "1", "-1", "1e-300", "1e99", "1e308", "-1e308", "1e400", "nan", "inf", "-inf", "1" * 30, "0x1f"),
@@ -212,12 +225,17 @@ def _meshes() -> list[str]:
     return [obj, f"solid\n{loops}\nendsolid", gltf, gltf, stl.hex(" ", 4), glb.hex(" ", 4)]
 
 
+def _bytes_of(digits: bytes) -> bytes:
+    """Return the bytes of hexadecimal digits among other signs."""
+    known = re.sub(rb"[^0-9a-f]", b"", digits).decode()
+    return bytes.fromhex(known[: len(known) // 2 * 2])
+
+
 def _read_mesh(path: Path) -> None:
     """Read a text as the format that it is, and its components, where it has some."""
     data = path.read_bytes()
     if data[:1] in b"06":
-        digits = re.sub(rb"[^0-9a-f]", b"", data).decode()
-        data = bytes.fromhex(digits[: len(digits) // 2 * 2])
+        data = _bytes_of(data)
     suffix = ".glb" if data[:4] == b"glTF" else ".gltf" if data.lstrip()[:1] in b"{[" else ".stl"
     suffix = ".obj" if suffix == ".stl" and data[:2] == b"v " else suffix
     named = path.with_suffix(suffix)
@@ -230,6 +248,55 @@ def _read_mesh(path: Path) -> None:
         read_mesh(named, unit="m")
 
 
+def _cells() -> list[str]:
+    """Return the cells of the examples, and one with every key, which counts twice."""
+    every = _texts(Path(__file__).with_name("every_key.toml"))
+    return [*_texts(*EXAMPLES.glob("*cell*.toml")), *every, *every]
+
+
+def _read_cell(path: Path) -> Cell:
+    """Read a cell beside which there is a mesh of a wedge."""
+    corners = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 0 0 40\n"
+    path.with_name("wedge.obj").write_text(f"{corners}f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8")
+    return read_cell(path)
+
+
+def _begin_world(path: Path) -> None:
+    """Begin the world of a cell, the collisions that are looked for in it, and one of its trials."""
+    cell = _read_cell(path)
+    CellCollisions(cell)
+    for world in (PhysicsCell(cell, seed=1), draw_case(cell, 1, 1).world()):
+        world.advance(3 * cell.period)
+        world.observations()
+
+
+def _pictures() -> list[str]:
+    """Return pictures of a chessboard as PNG and JPEG, in hexadecimal digits."""
+    board = np.kron(np.indices((5, 6)).sum(axis=0) % 2, np.ones((12, 12)))
+    grey = np.pad(255 - 200 * board, 12, constant_values=255).astype(np.uint8)
+    pictures = [Image.fromarray(grey), Image.fromarray(grey).convert("RGB"), Image.fromarray(grey).convert("P")]
+    texts = []
+    for picture, kind in zip((*pictures, *pictures[:2]), ("PNG", "PNG", "PNG", "JPEG", "JPEG"), strict=True):
+        file = io.BytesIO()
+        picture.save(file, kind)
+        texts.append(file.getvalue().hex(" ", 4))
+    return texts
+
+
+def _read_picture(path: Path) -> None:
+    named = path.with_suffix(".png")
+    named.write_bytes(_bytes_of(path.read_bytes()))
+    read_grey_picture(named)
+
+
+_LENS = """[cameras.TOP]
+width      = 640
+height     = 480
+focal_px   = [612, 610]
+centre_px  = [322, 236]
+distortion = [-0.12, 0.05, 0.001, -0.0005, 0]
+"""
+
 TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]] = {
     "arm": (".toml", read_arm, lambda: _texts(*(SOURCE / "arm" / "catalogue").glob("*.toml"))),
     "linkage": (".toml", read_linkage, lambda: _texts(*(SOURCE / "clearance" / "catalogue").glob("*.toml"))),
@@ -239,8 +306,10 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
         lambda path: load_mjcf(path, tip="pinch", lock=["left", "right"]),
         lambda: [*_texts(EXAMPLES / "desk_arm.xml"), arm_mjcf(load_arm("puma560")).text],
     ),
-    "cell": (".toml", read_cell, lambda: _texts(*EXAMPLES.glob("*cell*.toml"))),
+    "cell": (".toml", _read_cell, _cells),
+    "world": (".toml", _begin_world, _cells),
     "mesh": (".mesh", _read_mesh, _meshes),
+    "step": (".step", read_mesh, lambda: _texts(*STEP_FILES.glob("*.step"), lines=100_000)),
     "poses": (".toml", read_poses, lambda: _texts(EXAMPLES / "puma_poses.toml", EXAMPLES / "round_the_post.toml")),
     "iso9283": (
         ".csv",
@@ -252,6 +321,18 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
         lambda path: read_measurements(path, load_arm("puma560")),
         lambda: _tables(EXAMPLES / "puma_points.csv", lines=40),
     ),
+    "pictures": (".txt", _read_picture, _pictures),
+    "corners": (
+        ".csv",
+        lambda path: read_corners(path, Board(columns=9, rows=7, square=0.03, marker=0.022), (640, 480)),
+        lambda: _tables(EXAMPLES / "board_corners.csv", lines=400),
+    ),
+    "picture_joints": (
+        ".csv",
+        lambda path: read_picture_joints(path, load_arm("ur5")),
+        lambda: _tables(EXAMPLES / "board_joints.csv", lines=40),
+    ),
+    "lens": (".toml", read_lens, lambda: [_LENS]),
     "clearance": (
         ".csv",
         read_clearance_measurements,

@@ -4,7 +4,7 @@ A message names the object, the expected and the actual value, and the nearest v
 """
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
@@ -201,6 +201,12 @@ def shown(value: object) -> str:
 def counted(count: int, thing: str) -> str:
     """Return a number with a noun, such as ``1 move`` and ``2 moves``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Return names for a message, no more than some of them: ``a, b and 3 more``."""
+    more = f" and {len(names) - most:,} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def shortened(text: str) -> str:

@@ -25,6 +25,18 @@ def import_extra(module: str, purpose: str, extra: str, library: str = "") -> Mo
         raise _missing(purpose, extra, library or module.partition(".")[0]) from error
 
 
+def opencv(purpose: str) -> ModuleType:
+    """Import OpenCV.
+
+    Args:
+        purpose: what needs it, for the message.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    return import_extra("cv2", purpose, "physics", "opencv-python-headless")
+
+
 def require_extra(module: str, purpose: str, extra: str) -> None:
     """Refuse to go on without a library that another process imports.
 

@@ -129,6 +129,20 @@ def test_drawn_geoms_and_meshes(tmp_path: Path) -> None:
     np.testing.assert_allclose(world.max(axis=0), (0.2, 1.1, 1.3), atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["./block.stl", "a//block.stl", "a/./block.stl", "a/../block.stl", ".//./block.stl"])
+def test_names_of_mesh_files(name: str, tmp_path: Path) -> None:
+    """A mesh is found by any name of its file, though MuJoCo shortens it."""
+    (tmp_path / "a").mkdir()
+    for folder in (tmp_path, tmp_path / "a"):
+        trimesh.creation.box((0.1, 0.2, 0.3)).export(folder / "block.stl")
+    text = one(f'<asset><mesh name="m" file="{name}"/></asset>', geom='<geom type="mesh" mesh="m"/>')
+
+    (solid,) = load_mjcf(written(tmp_path, text)).links[0].solids
+
+    assert isinstance(solid.shape, Mesh)
+    np.testing.assert_allclose(np.sort(np.ptp(solid.shape.vertices, axis=0)), (0.1, 0.2, 0.3), atol=1e-6)
+
+
 def test_includes(tmp_path: Path) -> None:
     """What a file includes is read as if it stood there."""
     (tmp_path / "parts").mkdir()
@@ -201,6 +215,14 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]><mujoco model
 HOSTILE = {
     "nothing": ("", "arm.xml:1: not valid XML: no element found"),
     "no XML": ("<mujoco", "arm.xml:1: not valid XML: unclosed token"),
+    "a mesh of another scheme": (
+        one('<asset><mesh name="m" file="http://x/y.stl"/></asset>', geom='<geom type="mesh" mesh="m"/>'),
+        "y.stl: no such file",
+    ),
+    "a mesh with a slash at its end": (
+        one('<asset><mesh name="m" file="y.stl/"/></asset>', geom='<geom type="mesh" mesh="m"/>'),
+        "y.stl: no such file",
+    ),
     "another format": ("<robot/>", "arm.xml:1: expected <mujoco>, as MJCF files have, got <robot>"),
     "entities": (BOMB, "arm.xml:1: <!DOCTYPE>: a document type is not read, and MJCF files need none"),
     "depth": (NESTED, "arm.xml:1: <body>: nested too deeply: the limit is 60 levels"),
@@ -263,13 +285,13 @@ def test_hostile_files(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_what_is_left_out(tmp_path: Path) -> None:
-    """Textures, height fields and sensors take no memory; that springs and ellipsoids are not read is said."""
+    """Textures, height fields and sensors take no memory; that ellipsoids and parts of springs are not read is said."""
     before = """<size memory="1000G" nkey="1000000000"/><asset>
         <texture name="t" builtin="flat" width="99999" height="99999"/>
         <hfield name="h" nrow="99999" ncol="99999" size="1 1 1 1"/><material name="m" texture="t"/></asset>"""
     text = one(
         before,
-        joint='<joint name="turn" stiffness="3"/>',
+        joint='<joint name="turn" stiffness="3 1 0"/>',
         geom='<geom type="ellipsoid" size="0.1 0.2 0.3" material="m"/><geom type="hfield" hfield="h"/>',
         after='<sensor><jointpos joint="turn"/></sensor>',
     )
@@ -277,7 +299,9 @@ def test_what_is_left_out(tmp_path: Path) -> None:
     reading = read_mjcf(written(tmp_path, text))
 
     assert reading.arm.links[0].solids == ()
-    assert {"joint 'turn': its spring is not read", "body 'arm': ellipsoids are not read"} <= {*reading.notes}
+    assert {"joint 'turn': of its spring only the linear part is read", "body 'arm': ellipsoids are not read"} <= {
+        *reading.notes
+    }
 
 
 def test_limits_are_raised(tmp_path: Path) -> None:

@@ -170,6 +170,8 @@ def test_packages(folder: Path) -> None:
     path = write(folder / "arm.urdf", shape("package://x/meshes/other.stl", "1e-3 1e-3 1e-3"))
     with pytest.raises(KindError, match=r"packages: expected folders by the names of packages, got \['x'\]"):
         load_urdf(path, packages=wrong)
+    with pytest.raises(KindError, match="packages: expected the path of a folder for 'x', got 3"):
+        load_urdf(path, packages={"x": 3})  # type: ignore[dict-item]
     for value in ("x", "=a", "x=", f"x={folder / 'nothing'}"):
         done = armwright("convert", path, "-o", folder / "new.urdf", "--package", value)
         assert done.returncode == 2

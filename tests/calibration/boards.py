@@ -94,11 +94,6 @@ def projected(rng: np.random.Generator, scene: Scene, noise: float, board: Board
     return board_views(board, (WIDTH, HEIGHT), views)
 
 
-def lens_numbers(lens: Lens) -> Array:
-    """Return the numbers of the lens."""
-    return np.concatenate([lens.focal, lens.centre, lens.distortion])
-
-
 def _seen(hand: Array, camera: Array, board: Array, *, eye_in_hand: bool) -> Array:
     return inverse(camera) @ (inverse(hand) if eye_in_hand else hand) @ board
 

@@ -1,5 +1,7 @@
 """Boards and where they are seen: geometry as OpenCV has it, found in drawn pictures, refused where they deceive."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import attrs
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from armwright.calibration import board_detection
 from armwright.calibration.board import Board, BoardView, board_views
 from armwright.calibration.board_detection import board_finder, views_of_pictures
 from armwright.errors import FileFormatError, InvalidValueError, TooFewError, UnknownNameError
@@ -53,6 +56,37 @@ def test_corners_are_found_where_they_are_drawn(rng: np.random.Generator, board:
         errors = np.linalg.norm(view.pixels - expected, axis=1)
         assert np.median(errors) < 0.1
         assert errors.max() < 0.6
+
+
+@pytest.mark.parametrize("most", [300_000, 100_000])
+def test_large_pictures(rng: np.random.Generator, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a picture that is too large for OpenCV corners are found in a smaller one, and are as exact as otherwise."""
+    find, lens = board_finder(CHESSBOARD), random_lens(rng)
+    errors = []
+    for _ in range(8):
+        X = pose(CHESSBOARD, (*rng.uniform(-0.3, 0.3, 2), rng.uniform(-3.1, 3.1)), 0.65)
+        picture = photographed(rng, CHESSBOARD, lens, X, 2.0)
+        expected = lens.project(CHESSBOARD.points @ X[:3, :3].T + X[:3, 3])
+        monkeypatch.setattr(board_detection, "_MAX_PIXELS", most)
+        view = find("drawn", picture)
+
+        assert view is not None
+        np.testing.assert_array_equal(view.corners, np.arange(len(CHESSBOARD.points)))
+        errors.append(np.linalg.norm(view.pixels - expected, axis=1))
+    assert np.median(errors) < 0.1
+    assert np.max(errors) < 0.6
+
+
+def test_a_picture_of_nothing_takes_little_memory() -> None:
+    """Pictures of a modern camera in which there is no board are looked through in some hundred megabytes."""
+    script = """import resource, numpy as np
+from armwright.calibration.board import Board
+from armwright.calibration.board_detection import board_finder
+find, before = board_finder(Board(columns=9, rows=7, square=0.03)), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+assert find("black", np.zeros((5000, 6000), np.uint8)) is None
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 1_500_000
 
 
 def test_a_mirrored_picture_is_refused(rng: np.random.Generator) -> None:

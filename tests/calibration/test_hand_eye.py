@@ -1,6 +1,7 @@
 """Hand-eye calibration: the truth lies within its intervals, an independent solver agrees, bad data are refused."""
 
 import re
+import sys
 
 import attrs
 import numpy as np
@@ -17,10 +18,10 @@ from armwright.calibration.board_detection import board_finder
 from armwright.calibration.camera_intrinsics import calibrate_intrinsics
 from armwright.calibration.hand_eye import HandEyeCalibration, calibrate_hand_eye
 from armwright.calibration.hand_eye_start import closed_form
-from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
+from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, ShapeError, TooFewError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous, inverse
-from calibration.boards import CHARUCO, Scene, board_views, lens_numbers, photographed, projected, random_scene
+from calibration.boards import CHARUCO, Scene, board_views, photographed, projected, random_scene
 from calibration.simulated import random_arm, random_pose
 from samples import Sample
 
@@ -41,7 +42,7 @@ def errors(found: HandEyeCalibration, scene: Scene) -> Array:
     rows = []
     for X, truth in ((found.camera, scene.camera), (found.board, scene.board)):
         rows += [truth[:3, 3] - X[:3, 3], Rotation.from_matrix(truth[:3, :3] @ X[:3, :3].T).as_rotvec()]
-    numbers = lens_numbers(scene.lens) - lens_numbers(found.lens)
+    numbers = scene.lens.numbers - found.lens.numbers
     return np.concatenate([*rows, numbers[list(found.lens_numbers)]])
 
 
@@ -94,9 +95,7 @@ def cost_by_hand(scene: Scene, views: BoardViews, sigma: float, *, fit_lens: boo
             rows.append((view.pixels - pixels).ravel() / sigma)
         return np.concatenate(rows)
 
-    start = np.concatenate(
-        [vector(scene.camera), vector(scene.board), lens_numbers(scene.lens), np.zeros(6 * len(hand))]
-    )
+    start = np.concatenate([vector(scene.camera), vector(scene.board), scene.lens.numbers, np.zeros(6 * len(hand))])
     if fit_lens:
         return residuals, start
     held = np.arange(12, 21)
@@ -248,7 +247,7 @@ def test_the_wrong_setup_is_refused(rng: np.random.Generator, *, eye_in_hand: bo
     scene = random_scene(rng, ARM, 10, eye_in_hand=eye_in_hand, accuracy=ArmAccuracy())
     views = projected(rng, scene, PIXEL_NOISE)
 
-    with pytest.raises(ContradictionError, match=r"the camera is on the hand,? or beside the arm|behind the camera"):
+    with pytest.raises(ContradictionError, match=r"the camera is on the tool,? or beside the arm|behind the camera"):
         calibrate_hand_eye(views, scene.readings, lens=scene.lens, eye_in_hand=not eye_in_hand)
 
 
@@ -278,13 +277,22 @@ def test_parallel_rotations_are_refused_with_their_direction(rng: np.random.Gene
         )
 
 
+def test_missing_opencv_is_one_line(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a known lens and a table of corners, too, a missing OpenCV is told with how to install it."""
+    scene = random_scene(rng, ARM, 6, eye_in_hand=True, accuracy=ArmAccuracy())
+    views = projected(rng, scene, PIXEL_NOISE)
+    monkeypatch.setitem(sys.modules, "cv2", None)
+    with pytest.raises(MissingExtraError, match="needs opencv-python-headless; install it by: pip install"):
+        calibrate_hand_eye(views, scene.readings, lens=scene.lens)
+
+
 def test_small_rotations_and_few_pictures_are_refused(rng: np.random.Generator) -> None:
     """Two pictures are too few, and rotations of two degrees too small."""
     scene = random_scene(rng, ARM, 6, eye_in_hand=True, accuracy=ArmAccuracy())
     views = projected(rng, scene, PIXEL_NOISE)
     near = attrs.evolve(scene.readings, q=scene.readings.q[:1] + np.radians(2) * np.eye(6))
 
-    with pytest.raises(InvalidValueError, match=r"turns by [23](\.\d)? degrees at most"):
+    with pytest.raises(InvalidValueError, match=r"rotates by [23](\.\d)? degrees at most"):
         calibrate_hand_eye(views, near, lens=scene.lens)
     with pytest.raises(TooFewError, match=r"expected 3 pictures or more with joint positions, got 2"):
         calibrate_hand_eye(views.take([0, 1]), scene.readings.take([0, 1]), lens=scene.lens)

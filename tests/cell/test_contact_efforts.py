@@ -150,4 +150,4 @@ def test_the_wrench_at_the_tool(share: float) -> None:
     np.testing.assert_allclose(hardware.tool_wrenches("ARM_1", 1e3), whole[-1:], atol=AGREES)
     up = TILTED[:3, :3].T @ (0.0, 0.0, 1.0)
     np.testing.assert_allclose(np.cross(whole[-1, :3], up), 0.0, atol=AGREES)
-    assert hardware.contact_force("ARM_1", 1e3)[2] == pytest.approx(float(whole[-1, :3] @ up))
+    assert hardware.contact_wrench("ARM_1", 1e3)[2] == pytest.approx(float(whole[-1, :3] @ up))

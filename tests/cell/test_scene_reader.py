@@ -15,6 +15,7 @@ ARM = """[arms.ARM_1]
 hand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]
 """
 HERE = "[1,0,0, 0,1,0, 0,0,1, 0.5,0.1,0.2]"
+PART = f"[parts.{{}}]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\n"
 
 
 def cell(folder: Path, text: str) -> Cell:
@@ -108,10 +109,35 @@ def test_grippers(tmp_path: Path) -> None:
             "parts, B, marker, id: the parts A and B have the same marker 7",
         ),
         (
+            f"[parts.A]\nsize_mm = [1e-3, 1e-3, 1e-3]\nmass_kg = 1e-6\nat = {HERE}\n",
+            "parts, A, mass_kg: too small for such a shape; about an axis its moment of inertia is 1.67e-19 kg m²",
+        ),
+        (
             f"[parts.A]\nsize_mm = [1, 1, 1]\nmass_kg = 1\nat = {HERE}\nsymmetry = 1.5\n",
             "symmetry: expected a whole number, got 1.5",
         ),
         ('[visions]\nOBJ = { part = "BLOK" }\n', "OBJ, part: BLOK is not a part of the cell"),
+        (
+            f'[scene]\nspheres = [{{ name = "Post", at = {HERE}, diameter_mm = 1 }}]\n{PART.format("POST")}',
+            "parts, POST: POST is the name of a body or a marker of the scene too; rename one of them",
+        ),
+        (
+            f"[scene]\ntable = {{ z = 0, from = [0, 0], to = [1, 1] }}\n{PART.format('table')}",
+            "parts, table: TABLE is the name of a body",
+        ),
+        (
+            f'[scene]\nmarkers = [{{ name = "A", id = 3, size_mm = 9, at = {HERE} }}]\n{PART.format("A")}',
+            "parts, A: A is the name of a body or a marker",
+        ),
+        (
+            f'[scene]\nspheres = [{{ name = "arm-01", at = {HERE}, diameter_mm = 1 }}]\n',
+            "ARM_1 cannot name a body or a marker of the scene",
+        ),
+        (
+            f'[scene]\nmarkers = [{{ name = "World", id = 3, size_mm = 9, at = {HERE} }}]\n',
+            "WORLD cannot name a body or a marker of the scene",
+        ),
+        ("[arms.ARM_1.sensors]\nencoder_counts = 1e-320\n", "encoder_counts: expected 1 or more, or 0 for exact"),
         ("[arms.ARM_1.gripper]\nforce_N = 0\n", "gripper, force_N: expected 0.001 to 100000, got 0"),
     ],
 )
@@ -208,3 +234,49 @@ def test_mistakes_of_meshes(keys: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(FileFormatError) as error:
         cell(tmp_path, f"[parts.BLOCK]\n{keys}\nmass_kg = 0.2\nat = {HERE}\n")
     assert said.replace("{folder}", str(tmp_path)) in str(error.value)
+
+
+def test_a_body_on_a_frame(tmp_path: Path) -> None:
+    """Its pose refers to the frame, wherever that hangs; the frame has its spread, and the body its hardness."""
+    read = cell(
+        tmp_path,
+        f"""[frames]
+BENCH = {{ at = [0,1,0, -1,0,0, 0,0,1, 0.6,0,0.1], spread_mm = 2, spread_deg = 90 }}
+RIM = {{ on = "BENCH", at = [1,0,0, 0,1,0, 0,0,1, 0,0,0.05], tilt_deg = 3 }}
+[scene]
+boxes = [{{ name = "WALL", on = "rim", at = {HERE}, size_mm = [1, 1, 1], contact_ms = 4 }}]
+""",
+    )
+
+    wall = read.fixtures["WALL"]
+    np.testing.assert_allclose(wall.pose[:3, 3], [0.6 - 0.1, 0.5, 0.35], atol=1e-12)
+    assert (wall.on, wall.contact_time) == ("RIM", pytest.approx(4e-3))
+    bench, rim = read.spreads["BENCH"], read.spreads["RIM"]
+    assert (bench.position, bench.yaw, bench.tilt) == pytest.approx((2e-3, np.pi / 2, 0))
+    assert (rim.position, rim.yaw, rim.tilt) == pytest.approx((0, 0, np.radians(3)))
+
+
+@pytest.mark.parametrize(
+    ("frames", "body", "said"),
+    [
+        ("", 'on = "BENCK"', "on: BENCK is not a standing frame of the cell; did you mean BENCH?"),
+        ("", 'on = "ARM_1"', "on: ARM_1 is not a standing frame of the cell; there is BENCH, STATION, WORLD"),
+        ("", 'on = "HELD"', "on: HELD is not a standing frame of the cell; there is BENCH, STATION, WORLD"),
+        ("", "contact_ms = 0", "contact_ms: expected 2 to 1000, got 0"),
+        ("TIP = { on = 'HELD', at = @, spread_mm = 1 }", "", "TIP: TIP moves with ARM_1; only a frame that stands"),
+        ("TIP = { at = @, spread_mm = -1 }", "", "spread_mm: expected 0 to 1e+06, got -1"),
+        ("TIP = { at = @, tilt_deg = 100 }", "", "tilt_deg: expected 0 to 90, got 100"),
+    ],
+)
+def test_mistakes_about_frames(frames: str, body: str, said: str, tmp_path: Path) -> None:
+    """A body stands on what stands, and only what stands has a spread."""
+    text = f"""[frames]
+BENCH = {HERE}
+HELD = {{ on = "ARM_1", at = {HERE} }}
+{frames.replace("@", HERE)}
+[scene]
+boxes = [{{ name = "WALL", at = {HERE}, size_mm = [1, 1, 1]{"," if body else ""} {body} }}]
+"""
+    with pytest.raises(FileFormatError) as caught:
+        cell(tmp_path, text)
+    assert said in str(caught.value)

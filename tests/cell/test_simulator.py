@@ -160,12 +160,12 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     hardware.start_motion("ARM_1", motion, 3.0, np.eye(4))
 
     assert hardware.contact_time("ARM_1") == pytest.approx(4.0, abs=1e-9)
-    assert hardware.contact_force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
+    assert hardware.contact_wrench("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
     for later, local in ((4.5, 1.5), (5.0, 2.0), (60.0, 2.0)):
         np.testing.assert_array_equal(hardware.configuration("ARM_1", later), motion(local))
         depth = plane - (X_WB @ forward(arm, motion(local)))[2, 3]
-        np.testing.assert_allclose(hardware.contact_force("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
-        np.testing.assert_allclose(hardware.peak_contact("ARM_1", later), (depth, 1000 * depth), atol=1e-9)
+        np.testing.assert_allclose(hardware.contact_wrench("ARM_1", later), (0, 0, 1000 * depth, 0, 0, 0), atol=1e-6)
+        np.testing.assert_allclose(hardware.peak_contact("ARM_1", later)[:2], (depth, 1000 * depth), atol=1e-9)
     # Deeper than 5 mm it has come on the first tick at which it is.
     heights = np.array([(X_WB @ forward(arm, motion(k * 1e-3)))[2, 3] for k in range(2001)])
     assert hardware.excess_depth_time("ARM_1") == pytest.approx(3.0 + np.flatnonzero(heights < plane - 5e-3)[0] * 1e-3)
@@ -175,8 +175,8 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     assert hardware.contact_time("ARM_1") is None
     assert hardware.excess_depth_time("ARM_1") is None
     depth = plane - (X_WB @ forward(arm, motion(1.5)))[2, 3]
-    np.testing.assert_allclose(hardware.contact_force("ARM_1", 60.5), (0, 0, 1000 * depth), atol=1e-6)
-    assert not hardware.contact_force("ARM_1", 61.001).any()
+    np.testing.assert_allclose(hardware.contact_wrench("ARM_1", 60.5), (0, 0, 1000 * depth, 0, 0, 0), atol=1e-6)
+    assert not hardware.contact_wrench("ARM_1", 61.001).any()
 
 
 def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
@@ -191,13 +191,13 @@ def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
     low = attrs.evolve(cell.arms["ARM_1"], start=ends[0])
     hardware = Simulator(attrs.evolve(cell, arms={"ARM_1": low}, contact=ContactPlane(height=plane)))
     hardware.start_motion("ARM_1", motion, 0.0, X_HP)
-    pressed = hardware.contact_force("ARM_1", 1.0)[2]
+    pressed = hardware.contact_wrench("ARM_1", 1.0)[2]
     assert pressed > 1
 
     hardware.start_motion("ARM_1", hold(motion(1.0), 1.0), 1.0, np.eye(4))
-    assert hardware.contact_force("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
+    assert hardware.contact_wrench("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
     hardware.move_fingers("ARM_1", 0.0, closed=False)
-    assert hardware.contact_force("ARM_1", 2.0)[2] == 0
+    assert hardware.contact_wrench("ARM_1", 2.0)[2] == 0
 
 
 def test_fingers_take_their_time(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from armwright.calibration.arm_readings import ArmAccuracy
 from armwright.calibration.camera_tables import read_lens
 from armwright.files.document import Document
 from armwright.spatial.poses import from_noap
-from calibration.boards import CHARUCO, Scene, lens_numbers, photographed, random_scene
+from calibration.boards import CHARUCO, Scene, photographed, random_scene
 from cli_calls import armwright
 
 pytest.importorskip("cv2")
@@ -67,7 +67,7 @@ def test_pictures_of_a_camera_beside_the_arm(scene: Scene, folder: Path, tmp_pat
     assert "on" not in camera
     lens = read_lens(out / "camera.toml")
     lens_errors = [value["standard_error"] for value in data["lens"].values()]
-    assert np.all(np.abs(lens_numbers(lens) - lens_numbers(scene.lens)) < 5 * np.array(lens_errors))
+    assert np.all(np.abs(lens.numbers - scene.lens.numbers) < 5 * np.array(lens_errors))
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.count("<img ") == 3
     assert "http://" not in page

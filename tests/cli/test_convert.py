@@ -91,6 +91,18 @@ def test_cell_to_mjcf(tmp_path: Path) -> None:
     assert model.body("ARM_2/link6").id > 0
 
 
+def test_an_arm_of_a_cell_in_mjcf(tmp_path: Path) -> None:
+    """Of the MJCF file of a cell an arm is converted, and a note says that this is not all, and what reads all."""
+    armwright("convert", CELL, "-o", tmp_path / "cell.xml")
+
+    part = ("--base", "ARM_2/base", "--tip", "ARM_2/tool", "--lock", "ARM_2/left,ARM_2/right")
+    done = armwright("convert", tmp_path / "cell.xml", *part, "-o", tmp_path / "arm.toml")
+
+    assert done.returncode == 0, done
+    assert load_arm(tmp_path / "arm.toml").n == 6
+    assert "the file is a cell, of which ARM_2 alone is read; armwright.physics.read_cell_mjcf" in done.stdout
+
+
 def test_part_of_a_chain(tmp_path: Path) -> None:
     """Base, tip and locked joints are named on the command line."""
     part = ("--base", "upper_arm", "--tip", "gripper", "--lock", "forearm_roll,wrist_tilt")

@@ -275,7 +275,8 @@ class Terminal:
         self.seen = ""
 
     def type(self, text: str) -> None:
-        """Type some characters."""
+        """Type some characters, no sooner than a person can: a terminal that is being set up drops some."""
+        time.sleep(0.05)
         os.write(self._end, text.encode())
 
     def interrupt(self) -> None:

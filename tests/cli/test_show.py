@@ -5,10 +5,12 @@ import math
 import re
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
 from armwright.arm.load import arm_names, load_arm
+from armwright.arm.model import Motor
 from cli_calls import armwright
 
 HEADINGS = ("Denavit-Hartenberg", "Limits", "Links", "Drives")
@@ -118,7 +120,7 @@ def test_json_is_si(name: str) -> None:
         assert row["mass"] == link.mass
         np.testing.assert_array_equal(row["com"], link.com)
         np.testing.assert_array_equal(row["inertia"], link.inertia)
-        assert set(motor) == {"inertia", "viscous", "coulomb_forward", "coulomb_backward", "gear_ratio"}
+        assert set(motor) == {field.name for field in attrs.fields(Motor)}
     for key in ("base", "tool", "gravity"):
         np.testing.assert_array_equal(data[key], getattr(arm, key))
     if name == "puma560":

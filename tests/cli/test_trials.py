@@ -71,6 +71,27 @@ def test_trials_without_the_extra_run_in_this_process(folder: Path, monkeypatch:
     assert found["causes"] == {"misplaced": {"count": 3, "trials": [1, 2, 3]}}
 
 
+def test_other_files_are_other_trials(folder: Path) -> None:
+    """Trials are not resumed with another program or another mesh under the same name; the message says which it is."""
+    bench = folder / "bench.toml"
+    bodies = (
+        'meshes = [{ name = "WEDGE", mesh = "wedge.obj", unit = "mm", at = [1,0,0, 0,1,0, 0,0,1, 0.9,0.5,0.03] }]\n'
+    )
+    bench.write_text(bench.read_text(encoding="utf-8").replace("[scene]\n", f"[scene]\n{bodies}"), encoding="utf-8")
+    wedge = "v 0 0 0\nv 0 {0} 0\nv {0} 0 0\nv 0 0 {0}\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n"
+    (folder / "wedge.obj").write_text(wedge.format(20), encoding="utf-8")
+    command = ("--physics", "--trials", "1", "--workers", "1", "-o", "out")
+    _run(folder, *command, program="idle.rlo")
+
+    (folder / "wedge.obj").write_text(wedge.format(30), encoding="utf-8")
+    text = _run(folder, *command, program="idle.rlo", status=3)
+
+    assert "contains another sweep: settings.cell.fixtures.WEDGE is '" in text
+    (folder / "wedge.obj").write_text(wedge.format(20), encoding="utf-8")
+    (folder / "idle.rlo").write_text("BEGIN END.\n", encoding="utf-8")
+    assert "settings.code is '" in _run(folder, *command, program="idle.rlo", status=3)
+
+
 def test_failures_are_reported_for_people(folder: Path) -> None:
     text = _run(folder, "--physics", "--trials", "2", "--workers", "1", "--seed", "5", program="idle.rlo")
     assert "0 of 2 trials succeed: 0.0%" in text

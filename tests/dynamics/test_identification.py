@@ -82,7 +82,7 @@ def test_planar_arm() -> None:
     drives = [f"{name}{i}" for i in (1, 2) for name in ("viscous", "forward", "backward")]
     drives.insert(3, "rotor2")
     assert base.names == ("mx1", "my1", "Izz1", "mx2", "my2", "Izz2", *drives)
-    names = parameter_names(2)
+    names = parameter_names(arm)
     found = {
         row: dict(zip(names, numbers, strict=True)) for row, numbers in zip(base.names, base.combinations, strict=True)
     }

@@ -187,7 +187,7 @@ def test_terms() -> None:
         for name, value in ours(case).items():
             worst[name] = max(worst.get(name, 0.0), deviation(value, theirs[name]))
 
-    assert len(worst) == 11
+    assert len(worst) == 13
     assert max(worst.values()) < AGREEMENT, worst
 
 
@@ -210,6 +210,8 @@ def _terms_of_pinocchio(case: Case) -> dict[str, Array]:
         "gravity": pin.computeGeneralizedGravity(*case.links, q).copy(),
         "viscous": case.friction,
         "dry": np.zeros(n),
+        "smooth": np.zeros(n),
+        "spring": np.zeros(n),
         "load": pin.rnea(model, data, q, qd, qdd) - links,
         "outside": pin.rnea(*case.links, q, qd, qdd, push) - links,
         "total": pin.rnea(model, data, q, qd, qdd, push) + rotors * qdd + case.friction,

@@ -60,7 +60,23 @@ COLOURS = {
 
 _SCRAPS = (
     *(DECLARATIONS | TYPES | OPERATORS | KEYWORDS | UNITS.keys() | FUNCTIONS.keys() | PREDECLARED.keys()),
-    *("ARM_1", "arm-2", "ARM", "x", "a_1", "1", "0.5", "1E5", "2mm", "10 ", "\n100 ", '"text"', "{ a }", "// b\n"),
+    *(
+        "ARM_1",
+        "arm-2",
+        "ARM",
+        "x",
+        "zero",
+        "a_1",
+        "1",
+        "0.5",
+        "1E5",
+        "2mm",
+        "10 ",
+        "\n100 ",
+        '"text"',
+        "{ a }",
+        "// b\n",
+    ),
     *("<=", "<>", ">=", *" \t\n;,.:=()[]+-*/<>#'{}_"),
 )
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.arm.load import load_arm, read_arm
+from armwright.arm.urdf.reader import load_urdf
 from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
 from armwright.clearance.reader import read_linkage
@@ -29,6 +30,8 @@ from armwright.program.language_server.cell_lookup import CellCache
 
 ROOT = Path(__file__).resolve().parents[2]
 IDENTITY = "[1,0,0, 0,1,0, 0,0,1, 0,0,0]"
+CELL = "[arms.ARM_1]\njoint_positions = [0, -1, 0.5, 0, 1, 0]\n"
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
 def refused(action: Callable[[], object]) -> str:
@@ -64,6 +67,15 @@ BEYOND: dict[str, tuple[int, str, Callable[[Path], object]]] = {
         f"[frames]\nA = {IDENTITY}\nB = {{ on = 'A', at = {IDENTITY} }}\n",
         lambda path: read_cell(path, arms_needed=False),
     ),
+    "parts": (1, f"{CELL}[parts.A]\n[parts.B]\n", read_cell),
+    # Of all kinds together.
+    "fixtures": (
+        2,
+        f"{CELL}[scene]\nboxes = [{{ name = 'A', size_mm = [1, 1, 1], at = {IDENTITY} }}]\nspheres = ["
+        + ", ".join(f"{{ name = '{name}', diameter_mm = 1, at = {IDENTITY} }}" for name in "BC")
+        + "]\n",
+        read_cell,
+    ),
     "arms": (1, "[arms.ARM_1]\n[arms.ARM_2]\n", read_cell),
     "revolutions": (2, "[[joint]]\nkind = 'revolute'\nlimits = { upper_deg = 721, lower_deg = 0 }\n", read_arm),
 }
@@ -98,6 +110,29 @@ def test_urdf_limits(tmp_path: Path) -> None:
     assert "nested too deeply: the limit is 60 levels" in refused(lambda: load_urdf(path))
     path.write_text("<robot name='r'>" + "<link>" * 5000 + "</link>" * 5000 + "</robot>")
     assert "not valid XML: Excessive depth" in refused(lambda: load_urdf(path))
+
+
+def test_meshes_of_one_file(tmp_path: Path) -> None:
+    """The triangles of all meshes that a file names are counted together, as often as they are named."""
+    (tmp_path / "a.obj").write_text(TETRAHEDRON)
+    meshes = [f"{{ name = '{name}', mesh = 'a.obj', unit = 'm', at = {IDENTITY} }}" for name in "AB"]
+    cell = tmp_path / "cell.toml"
+    cell.write_text(f"{CELL}[scene]\nmeshes = [{', '.join(meshes)}]\n")
+    arm = tmp_path / "arm.toml"
+    solids = ", ".join(3 * ["{ kind = 'mesh', mesh = 'a.obj', unit = 'm' }"])
+    arm.write_text(f"[[joint]]\nkind = 'revolute'\nlink = {{ solids = [{solids}] }}\n")
+    robot = tmp_path / "robot.urdf"
+    shapes = "".join(
+        f"<collision><geometry><mesh filename='a.obj' scale='{n} 1 1'/></geometry></collision>" for n in (1, 2, 2)
+    )
+    robot.write_text(urdf(2).replace("<link name='l1'/>", f"<link name='l1'>{shapes}</link>"))
+
+    for path, count, read in ((cell, 8, read_cell), (arm, 12, read_arm), (robot, 8, load_urdf)):
+        with raised(file_triangles=count):
+            read(path)
+        with raised(file_triangles=count - 1):
+            message = refused(lambda read=read, path=path: read(path))
+        assert f"too many in this file: {count}; the limit is {count - 1} triangles" in message
 
 
 def test_entities_are_not_expanded(tmp_path: Path) -> None:

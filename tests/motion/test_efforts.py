@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
@@ -108,6 +108,53 @@ def test_slowing_of_a_block() -> None:
     assert slowing_for_efforts(block(peak / 4), move).factor == pytest.approx(2.0, rel=1e-9)
     light = attrs.evolve(block(10.0, viscous=20.0), links=[Link()])
     assert slowing_for_efforts(light, move).factor == pytest.approx(20 * 15 / 8 * 3 / 2 / 10, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {"cube_root": 4.0},
+        {"stribeck": 3.0, "stribeck_speed": 1.0},
+        {
+            "stribeck": 3.0,
+            "stribeck_speed": 0.3,
+            "cube_root": 2.0,
+            "viscous": 1.0,
+            "offset": 0.5,
+            "coulomb_forward": 1.0,
+        },
+    ],
+)
+def test_slowing_with_uneven_friction(friction: dict[str, float]) -> None:
+    """It is the fastest of a thousand slower motions that keeps the effort, and none of those below it."""
+    move = quintic([0.0], [3.0], 2.0)
+    free = effort_peaks(block(np.inf, **friction), move).peaks[0]
+    arm = block(0.75 * free, **friction)
+
+    found = slowing_for_efforts(arm, move)
+
+    def use(factor: float) -> float:
+        slower = move.slowed(factor)
+        t = np.linspace(0, slower.duration, 4001)[1:-1]
+        efforts = inverse_dynamics(arm, slower(t), slower(t, 1), slower(t, 2))
+        return float(np.abs(efforts).max() / arm.limits.effort[0])
+
+    assert found.factor > 1.05
+    assert found.joint == 0
+    assert use(found.factor) <= 1 + SEEN
+    assert all(use(factor) > 1 for factor in np.linspace(1.0, found.factor * (1 - SEEN), 50))
+
+
+def test_a_spring_in_the_way() -> None:
+    """A spring takes as much however slow the motion is: where that is too much, it is told."""
+    strained = block(10.0)
+    joint = attrs.evolve(strained.joints[0], spring=Spring(stiffness=5.0, rest=0.0))
+    strained = attrs.evolve(strained, joints=[joint])
+    move = quintic([0.0], [3.0], 1.0)
+
+    with pytest.raises(ArmwrightError, match="gravity, springs and Coulomb friction alone require 15 N of joint 1"):
+        slowing_for_efforts(strained, move)
+    assert slowing_for_efforts(strained, quintic([0.0], [1.0], 0.8)).factor > 1
 
 
 def test_nothing_to_slow() -> None:

@@ -58,11 +58,19 @@ def rod(effort: float, speed: float = np.inf, **motor: float) -> Arm:
     )
 
 
-def shortest_swing(effort: float, viscous: float = 0.0, coulomb: float = 0.0) -> float:
+def shortest_swing(effort: float, **friction: float) -> float:
     """The time of the rod from DOWN to ALOFT, full torque forward and then full torque backward, by its phase plane."""
 
+    def resistance(x: Any) -> Any:
+        v, terms = (
+            np.sqrt(np.maximum(x, 0)),
+            {"viscous": 0.0, "coulomb": 0.0, "cube_root": 0.0, "stribeck": 0.0, **friction},
+        )
+        fades = terms["stribeck"] * np.exp(-((v / terms.get("stribeck_speed", 1.0)) ** 2))
+        return terms["coulomb"] + fades + terms["viscous"] * v + terms["cube_root"] * np.cbrt(v)
+
     def slope(torque: float) -> Any:
-        return lambda q, x: 2 / INERTIA * (torque - coulomb - WEIGHT * np.cos(q) - viscous * np.sqrt(np.maximum(x, 0)))
+        return lambda q, x: 2 / INERTIA * (torque - WEIGHT * np.cos(q) - resistance(x))
 
     exact = {"rtol": 1e-10, "atol": 1e-12, "dense_output": True}
     up = solve_ivp(slope(effort), (DOWN, ALOFT), [0.0], **exact).sol
@@ -133,10 +141,21 @@ def test_the_joint_that_takes_longest() -> None:
     assert found.bindings[0].share > 0.99
 
 
-@pytest.mark.parametrize("friction", [{}, {"coulomb": 1.0}, {"viscous": 0.2}, {"viscous": 1.0}])
+@pytest.mark.parametrize(
+    "friction",
+    [
+        {},
+        {"coulomb": 1.0},
+        {"viscous": 0.2},
+        {"viscous": 1.0},
+        {"cube_root": 1.0},
+        {"stribeck": 0.8, "stribeck_speed": 0.5, "coulomb": 0.2},
+        {"stribeck": 0.8, "stribeck_speed": 3.0, "cube_root": 0.5, "viscous": 0.2},
+    ],
+)
 def test_a_rod_is_swung_up(friction: dict[str, float]) -> None:
     """The phase plane of one joint gives the shortest time under a limit of torque; the torque binds all the time."""
-    motor = {"viscous": friction.get("viscous", 0.0)}
+    motor = {name: number for name, number in friction.items() if name != "coulomb"}
     motor |= dict.fromkeys(("coulomb_forward", "coulomb_backward"), friction.get("coulomb", 0.0))
 
     found = time_optimal(rod(8.0, **motor), [[DOWN], [ALOFT]])

@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import Arm, Joint, Limits, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
@@ -78,3 +78,26 @@ def of_all_kinds(arm: Arm, rng: np.random.Generator) -> Arm:
     names = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
     motors = [Motor(**dict(zip(names, rng.uniform(0.1, 2.0, size=4), strict=True))) for _ in range(arm.n)]
     return attrs.evolve(arm, joints=joints, links=links, motors=motors)
+
+
+def with_all_friction(arm: Arm, rng: np.random.Generator) -> Arm:
+    """The arm with drives that have every kind of friction, or some kinds at some joints."""
+    numbers = rng.uniform(0.1, 2.0, size=(arm.n, 8)) * (rng.random((arm.n, 8)) < 0.7)
+    names = ("inertia", "viscous", "coulomb_forward", "coulomb_backward", "stribeck", "cube_root", "offset")
+    motors = []
+    for motor, row in zip(arm.motors, numbers, strict=True):
+        values = dict(zip(names, row, strict=False))
+        values["offset"] *= rng.choice([-1, 1])
+        motors.append(attrs.evolve(motor, **values, stribeck_speed=rng.uniform(0.1, 1.0)))
+    return attrs.evolve(arm, motors=motors)
+
+
+def with_springs(arm: Arm, rng: np.random.Generator) -> Arm:
+    """The arm with springs at most of its joints, one at the first at least."""
+    joints = [
+        attrs.evolve(joint, spring=Spring(stiffness=rng.uniform(1.0, 20.0), rest=rng.normal()))
+        if i == 0 or rng.random() < 0.7
+        else joint
+        for i, joint in enumerate(arm.joints)
+    ]
+    return attrs.evolve(arm, joints=joints)

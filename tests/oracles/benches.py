@@ -76,6 +76,19 @@ END.
 """
 
 
+# What takes the block and lifts it, in front of a program that goes on with it in the hand.
+HOLD = """  READ VISIONS (obj) ;
+  AFFIX apo TO obj AT XYZ(0, 0, -0.08) ;
+  OPEN ARM_1 ;
+  MOVE ARM_1 TO obj WITH APPROACH = apo ;
+  GRASP ARM_1 ;
+  AFFIX obj TO ARM_1 ;
+  MOVE ARM_1 TO apo STRAIGHTLY ;
+"""
+# Speeds at which an arm stops within 5 mm, which is what a cell allows.
+STOPPING_SPEEDS = {"stanford": (3.0, 25.0), "puma560": (3.0, 9.0)}
+
+
 def bench_text(arm: str = "stanford") -> str:
     """The text of the cell file of a bench."""
     entries, (x, y, z), (low, high) = ARMS[arm]
@@ -98,6 +111,12 @@ def bench(folder: Path, arm: str = "stanford", *changes: tuple[str, str]) -> Cel
     path = folder / "bench.toml"
     path.write_text(text, encoding="utf-8")
     return read_cell(path)
+
+
+def without_pictures(cell: Cell) -> Cell:
+    """A cell whose camera answers with what is true, without pictures."""
+    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
+    return attrs.evolve(cell, cameras={}, sights=sights)
 
 
 def compiled(cell: Cell, program: str = PROGRAM) -> Compilation:

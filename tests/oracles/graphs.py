@@ -87,6 +87,12 @@ def _angle(y: complex, x: complex) -> complex:
     return np.arctan2(y_0, x_0) + np.arctan((y * x_0 - x * y_0) / (x * x_0 + y * y_0))
 
 
+def _cube_root(a: complex) -> complex:
+    """The root of the real number, and from there on along its tangent."""
+    root = np.cbrt(np.real(a))
+    return root + 1j * np.imag(a) / (3 * root * root)
+
+
 # Functions of complex numbers whose values and slopes at real ones are those of an operation.
 _OF_COMPLEX: dict[str, Callable[..., complex]] = {
     "add": lambda a, b: a + b,
@@ -97,6 +103,8 @@ _OF_COMPLEX: dict[str, Callable[..., complex]] = {
     "sin": np.sin,
     "cos": np.cos,
     "sqrt": np.sqrt,
+    "cbrt": _cube_root,
+    "exp": np.exp,
     "atan2": _angle,
     "absolute": lambda a: a if np.real(a) > 0 else -a,
     "round": lambda a: np.round(np.real(a)),

@@ -13,8 +13,8 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.quintic_polynomials import point_to_point
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm
+from armwright.physics.cell_bodies import Body, arm_bodies
+from armwright.physics.clearance import RESOLUTION, ClearanceChecker, PlacedArm
 from armwright.physics.configuration_checks import ConfigurationChecks
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector

@@ -23,7 +23,7 @@ def holding(
     """A fixed gripper that points down and has closed on a block without weight."""
     spec = new_world(np.zeros(3), 1e-3)
     tool = spec.worldbody.add_body(name="A/tool", pos=(0, 0, 0.5), quat=DOWN)
-    add_gripper(spec, "A", tool, gripper, 1e-3, contype=4, conaffinity=3)
+    add_gripper(spec, "A", tool, gripper, contype=4, conaffinity=3)
     block = spec.worldbody.add_body(name="BLOCK", pos=(0, 0, height))
     block.add_freejoint()
     block.explicitinertial, block.mass, block.inertia = True, mass, (mass * SIDE**2 / 6,) * 3

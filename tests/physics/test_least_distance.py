@@ -4,7 +4,8 @@ import numpy as np
 
 from armwright.compiled.arm import compile_arm
 from armwright.motion.quintic_polynomials import quintic
-from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, PlacedArm, Window
+from armwright.physics.cell_bodies import Body
+from armwright.physics.clearance import RESOLUTION, ClearanceChecker, PlacedArm, Window
 from armwright.spatial.shapes import Solid
 from oracles.arms import random_arm, random_configurations, random_pose
 from oracles.solids import coal_distance, coal_shape, random_shape

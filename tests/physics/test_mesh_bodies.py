@@ -39,8 +39,8 @@ def test_hulls(opened: str, sample: Sample) -> None:
         X, Y = random_pose(rng), random_pose(rng)
         Y[:3, 3] = X[:3, 3] + rng.normal(size=3) * 0.4
         distances = Distances([as_mesh(mesh), Sphere(radius=radius)])
-        distances.place(0, X)
-        distances.place(1, Y)
+        distances.set_pose(0, X)
+        distances.set_pose(1, Y)
         vertices, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
         vertices.extend(list(hull.vertices))
         faces.extend([coal.Triangle(*map(int, face)) for face in hull.faces])
@@ -100,7 +100,7 @@ at = [1,0,0, 0,1,0, 0,0,1, 0.51,0.4,0.05]
     assert len(arranged) == len(bodies.roles)
     distances = Distances([body.solid.shape for body in arranged])
     for number, body in enumerate(arranged):
-        distances.place(number, body.solid.pose)
+        distances.set_pose(number, body.solid.pose)
     peg = [body.name for body in arranged].index("PEG")
     others = [number for number, body in enumerate(arranged) if body.name == "NEST"]
     return min(distances.between(number, peg, 1.0) for number in others)

@@ -10,7 +10,7 @@ import pytest
 from armwright.errors import InvalidValueError
 from armwright.motion.efforts import effort_peaks
 from armwright.motion.quintic_polynomials import TOP_SPEED
-from armwright.physics.clearance import Body
+from armwright.physics.cell_bodies import Body
 from armwright.physics.planner import PlannedPath, PlanningError, plan_path
 from armwright.spatial.shapes import Box, Solid, Sphere
 from physics.cluttered import (
@@ -26,6 +26,8 @@ from physics.cluttered import (
 )
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 ARMS = ("stanford", "puma560", "ur5")
 # Of so many checked configurations a search of OMPL may use ten times as many.
 CHECKS = 20_000
@@ -38,12 +40,13 @@ def planned(task: Task, **options: float) -> PlannedPath:
     return plan_path(task.checker, ARM, task.start, task.goals, **options)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.proof
 @pytest.mark.parametrize("name", ARMS)
 def test_cluttered_cells(name: str, sample: Sample) -> None:
     """No path collides, as coal finds at many configurations; and nearly all are found that a longer search finds."""
     # Some cells have no path: the small sample goes on until there are some.
-    cells, enough, looks = (100, 100, 10_000) if sample.whole else (40, 3, 1000)
+    cells, enough, looks = (100, 100, 10_000) if sample.whole else (40, 2, 1000)
     collides = missed = solvable = solved = 0
     for k in range(cells):
         task = random_task(name, np.random.default_rng([sample.seed, k]))

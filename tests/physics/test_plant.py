@@ -14,7 +14,8 @@ from armwright.compiled.arm import compile_arm
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.physics.plant import ArmIndices, add_arm, arm_indices, dry_offsets, finish, new_world
+from armwright.physics.friction import dry_offsets
+from armwright.physics.plant import ArmIndices, add_arm, arm_indices, finish, new_world
 from oracles.arms import of_all_kinds, random_arm, random_pose
 from samples import Sample
 

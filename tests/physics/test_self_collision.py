@@ -12,8 +12,8 @@ from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint, Limits, Link
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import RESOLUTION, Body
+from armwright.physics.cell_bodies import Body, arm_bodies
+from armwright.physics.clearance import RESOLUTION
 from armwright.physics.self_collision import random_configurations, self_pairs, touch_bounds
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, farthest

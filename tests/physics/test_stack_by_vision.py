@@ -16,6 +16,8 @@ from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from samples import Sample
 
+pytestmark = pytest.mark.early
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 PROGRAM, CELL = EXAMPLES / "stack_by_vision.rlo", EXAMPLES / "vision_cell.toml"
@@ -78,6 +80,20 @@ def test_stack_after_a_mishap(frame: str, error: float) -> None:
 
     assert errors(recording) == ["R603"]
     assert stacked(world)[0] < 2e-3
+
+
+def test_stack_in_darkness() -> None:
+    """Where a camera sees nothing the program looks again, gives up in its own words, and the blocks stay."""
+    pytest.importorskip("cv2")
+    cell = read_cell(CELL)
+    dark = attrs.evolve(cell, cameras={name: attrs.evolve(it, light=0.0) for name, it in cell.cameras.items()})
+    world = PhysicsCell(dark, seed=1)
+
+    recording = armwright.program.run(PROGRAM, cell=dark, hardware=world)
+
+    assert errors(recording) == ["R601"] * 4
+    assert [effect.text for effect in recording.effects if effect.kind == "PRINT"] == ['PRINT "given up"']
+    assert not recording.stages
 
 
 def test_stack_without_physics() -> None:

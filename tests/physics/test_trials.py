@@ -1,5 +1,8 @@
 """What is drawn for trials, and the verdict on worlds that are set up to fail or succeed."""
 
+import json
+import re
+
 import attrs
 import numpy as np
 import pytest
@@ -12,7 +15,9 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.trials import draw_case, goal_pose, judge, placing_error
 from armwright.physics.world import PhysicsCell
+from armwright.program.vm.trials import cell_hashes
 from armwright.spatial.poses import homogeneous, inverse as inverse_pose
+from armwright.spatial.shapes import Mesh
 from oracles.benches import bench_text, flat_pose
 
 TRIALS = """[trials]
@@ -91,6 +96,28 @@ def test_parts_are_drawn_anew_where_they_would_stand_inside_others(cell: Cell) -
         draw_case(tight, 1, 1)
 
 
+def test_trials_of_another_cell_are_others(cell: Cell) -> None:
+    """What a trial depends on is part of what finished trials are stored for: meshes and both models of an arm too."""
+    arm, block = cell.arms["ARM_1"], cell.parts["BLOCK"]
+    corners = np.array([(0, 0, 0), (0.04, 0, 0), (0, 0.04, 0), (0, 0, 0.04)])
+    mesh = Mesh(vertices=corners, faces=np.array([(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]))
+    bent = attrs.evolve(mesh, vertices=mesh.vertices * (1 + 1e-15))
+    heavier = attrs.evolve(arm.arm, links=[attrs.evolve(link, mass=(link.mass or 0) + 1e-9) for link in arm.arm.links])
+    others = {
+        "the cell": cell,
+        "another model": attrs.evolve(cell, arms={"ARM_1": attrs.evolve(arm, arm=heavier, plant=arm.arm)}),
+        "another plant": attrs.evolve(cell, arms={"ARM_1": attrs.evolve(arm, plant=heavier)}),
+        "a mesh": attrs.evolve(cell, parts={"BLOCK": attrs.evolve(block, shape=mesh)}),
+        "another mesh": attrs.evolve(cell, parts={"BLOCK": attrs.evolve(block, shape=bent)}),
+        "a piece": attrs.evolve(cell, parts={"BLOCK": attrs.evolve(block, shape=attrs.evolve(mesh, pieces=[mesh]))}),
+        "a goal": attrs.evolve(cell, trials=attrs.evolve(cell.trials, goals={})),
+        "a period": attrs.evolve(cell, period=2e-3),
+    }
+
+    assert cell_hashes(attrs.evolve(cell)) == cell_hashes(cell)
+    assert len({json.dumps(cell_hashes(other)) for other in others.values()}) == len(others)
+
+
 def _world(cell: Cell, X: np.ndarray) -> PhysicsCell:
     parts = {"BLOCK": attrs.evolve(cell.parts["BLOCK"], pose=X)}
     return PhysicsCell(cell, parts=parts)
@@ -165,6 +192,22 @@ def test_a_part_that_a_gripper_touches_is_not_let_go(cell: Cell) -> None:
     assert judge(world, aloft, world.now).cause in {"", "moving"}
 
 
+def test_the_last_mishap_is_named_where_a_part_is_not_at_its_goal(cell: Cell) -> None:
+    """A hand that has closed on nothing may be why a part is elsewhere; where the part is at its goal it is no news."""
+    for x, words in (
+        (0.02, r"from its goal at SLOT; 1 mishap before, the last R603 at 0.\d{3} s: ARM_1 closed"),
+        (0, ""),
+    ):
+        world = _placed(cell, x=x)
+        seconds = world.move_fingers("ARM_1", 0.0, closed=True, frame="BLOCK")
+        mishap = world.advance(seconds + 0.1)
+        assert mishap is not None
+        assert mishap.code == "R603"
+        verdict = judge(world, cell, world.now)
+        assert verdict.cause == ("misplaced" if x else "")
+        assert re.search(words, verdict.message)
+
+
 def test_the_error_of_a_program_is_the_cause(cell: Cell) -> None:
     verdict = judge(_placed(cell), cell, 0.0, ("R603", "closed on nothing"))
     assert (verdict.cause, verdict.message) == ("R603", "closed on nothing")
@@ -197,3 +240,18 @@ def test_a_touch_is_a_cause_even_where_the_program_goes_on(cell: Cell) -> None:
     assert verdict.cause == "R604"
     assert "TABLE" in verdict.message
     assert verdict.distance < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "cause"),
+    [(1.9e-3, 0.0, ""), (2.1e-3, 0.0, "moving"), (0.0, 0.049, ""), (0.0, 0.051, "moving"), (np.nan, 0.0, "moving")],
+)
+def test_a_part_at_rest_neither_moves_nor_turns(cell: Cell, speed: float, turn: float, cause: str) -> None:
+    """Faster than 2 mm/s or 0.05 rad/s is no rest, and so is what is no number."""
+
+    class Restless(PhysicsCell):
+        def speed(self, part: str) -> tuple[float, float]:  # noqa: ARG002 - of any part
+            return speed, turn
+
+    parts = {"BLOCK": attrs.evolve(cell.parts["BLOCK"], pose=goal_pose(cell, "BLOCK"))}
+    assert judge(Restless(cell, parts=parts), cell, 0.0).cause == cause

@@ -14,7 +14,8 @@ from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import Photographer, add_camera, add_lights
-from armwright.physics.vision import Look, camera_in_world, look, marker_name, refuse_blind_cameras
+from armwright.physics.vision import Look, camera_in_world, look, marker_name
+from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import elementary_rotation, rotation_from_vector
 
@@ -190,20 +191,8 @@ def test_darkness_and_distance(scene: Scene) -> None:
         assert message.startswith(f"camera TOP does not see marker 3 of BLOCK: {why}")
 
 
-def test_cameras_that_cannot_see(tmp_path: Path) -> None:
-    """A part without a marker, and a cell without a camera, are refused before anything runs."""
-    for text, message in (
-        (
-            CELL.replace("marker = { id = 3, size_mm", "#"),
-            "a camera cannot find BLOCK: it has no marker; expected one in",
-        ),
-        (
-            CELL[: CELL.index("[cameras.TOP]")] + '[visions]\nOBJ = { part = "BLOCK" }\n',
-            "has no camera that takes a picture",
-        ),
-    ):
-        (tmp_path / "cell.toml").write_text(text, encoding="utf-8")
-        with pytest.raises(InvalidValueError, match=message):
-            refuse_blind_cameras(read_cell(tmp_path / "cell.toml"))
-    (tmp_path / "cell.toml").write_text(CELL, encoding="utf-8")
-    refuse_blind_cameras(read_cell(tmp_path / "cell.toml"))
+def test_part_without_a_marker(tmp_path: Path) -> None:
+    """A cell with physics in which a camera looks for a part without a marker is refused before anything runs."""
+    (tmp_path / "cell.toml").write_text(CELL.replace("marker = { id = 3, size_mm", "#"), encoding="utf-8")
+    with pytest.raises(InvalidValueError, match="a camera cannot find BLOCK: it has no marker; expected one in"):
+        PhysicsCell(read_cell(tmp_path / "cell.toml"))

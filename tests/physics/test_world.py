@@ -10,23 +10,18 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import load_arm
-from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.cell.control import Sensors, Servo
-from armwright.cell.hardware import Mishap
-from armwright.cell.model import Cell, CellArm
+from armwright.cell.model import Cell
 from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError
-from armwright.motion.quintic_polynomials import quintic
 from armwright.physics.servo import Reference
 from armwright.physics.world import PhysicsCell, drawn_parts
 from armwright.program.debugger.history import Timeline
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
-from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, placing_error
+from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, placing_error, without_pictures
 from samples import Sample
 
 # The block is found where the file says, without pictures.
@@ -45,9 +40,7 @@ RETRIED = PROGRAM.replace("BEGIN\n", "BEGIN\n  TRY\n", 1).replace(
 
 def blind(folder: Path, *changes: tuple[str, str], arm: str = "stanford") -> Cell:
     """A bench whose camera answers with what is true."""
-    cell = bench(folder, arm, *changes)
-    sights = {name: attrs.evolve(sight, camera=None) for name, sight in cell.sights.items()}
-    return attrs.evolve(cell, cameras={}, sights=sights)
+    return without_pictures(bench(folder, arm, *changes))
 
 
 def run(cell: Cell, program: str = PROGRAM, hardware: Any = None, **options: Any) -> Recording:
@@ -64,6 +57,7 @@ def moved(cell: Cell, x: float, y: float) -> dict[str, Part]:
 # ---- parts are placed ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.share(0.02)
 @pytest.mark.parametrize("arm", ARMS)
 def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
@@ -71,7 +65,7 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
     pytest.importorskip("cv2")
     cell = bench(tmp_path, arm)
     code = compiled(cell).code
-    off, tips, rejected = [], [], 0
+    off, tips, slips, rejected = [], [], [], 0
     for number, rng in enumerate(sample.cases(100)):
         drawn, parts, goal, refused = drawn_bench(cell, arm, rng)
         rejected += refused
@@ -79,15 +73,23 @@ def test_placed_by_vision(arm: str, sample: Sample, tmp_path: Path) -> None:
         recording = interpret(code, drawn, world)
         off.append(placing_error(world.true_pose("BLOCK"), goal))
         tips.append(recording.observations.facts["tip"]["ARM_1"])
+        slips.append(recording.observations.facts["slip"]["ARM_1"])
         same_trace(attrs.evolve(drawn, parts=parts), code, recording)
     distances = np.array(off)[:, 0]
     sample.record(
-        f"blocks placed by {arm}", len(off), int((distances > 2e-3).sum()), worst=distances.max(), rejected=rejected
+        f"blocks placed by {arm}",
+        len(off),
+        int((distances > 2e-3).sum()),
+        worst=distances.max(),
+        tip=max(tips),
+        slip=max(slips),
+        rejected=rejected,
     )
     assert distances.max() < 2e-3
     assert np.quantile(distances, 0.95) < 1e-3
     assert max(angle for _, angle in off) < np.radians(2.0)
     assert max(tips) < 1e-3
+    assert max(slips) < 3e-4
 
 
 def same_trace(cell: Cell, code: Any, recording: Recording) -> None:
@@ -148,19 +150,6 @@ at = [1,0,0, 0,1,0, 0,0,1, 0.9, 0.5, 0.13]
 [parts.BLOCK]"""
 
 
-def test_an_arm_hits_what_nobody_knew(tmp_path: Path) -> None:
-    """A post that stands where the file has none is hit: R604 names both; the arm is stopped and can go on."""
-    cell = blind(tmp_path, ("[parts.BLOCK]", OBSTACLE))
-    post = attrs.evolve(cell.parts["POST"], pose=flat_pose(0.52, 0.0, 0.13, 0.0))
-
-    error = failure(cell, parts={**cell.parts, "POST": post})
-
-    assert error.diagnostic.code == "R604"
-    assert error.diagnostic.message.startswith(
-        ("ARM_1 palm hits POST with", "ARM_1 link 6 hits POST with", "BLOCK hits POST with")
-    )
-
-
 def test_a_part_too_heavy(tmp_path: Path) -> None:
     """Two fingers of 30 N hold 6.1 kg: 5 kg are carried, 7 kg are lost, R605, and a TRY goes on from there."""
     light = blind(tmp_path, ("mass_kg = 0.2", "mass_kg = 4.5"))
@@ -175,31 +164,6 @@ def test_a_part_too_heavy(tmp_path: Path) -> None:
     given_up = RETRIED.replace("    RETRY ;\n", "    HALT ;\n")
     recording = run(heavy, given_up)
     assert [effect.data["code"] for effect in recording.effects if effect.kind == "ERROR"] == ["R605"]
-
-
-def test_an_arm_that_does_not_follow(tmp_path: Path) -> None:
-    """A servo too weak for its motion leaves the arm behind: R606 names the joint."""
-    cell = blind(tmp_path)
-    soft = attrs.evolve(cell.arms["ARM_1"], servo=Servo(bandwidth=1.0, integral=False, law="pd"))
-    weak = attrs.evolve(cell, arms={"ARM_1": attrs.evolve(soft, plant=heavier(soft.arm, 1.5))})
-
-    error = failure(weak)
-
-    assert error.diagnostic.code == "R606"
-    assert "ARM_1 does not follow its motion: joint" in error.diagnostic.message
-
-
-def test_a_world_without_meaning(tmp_path: Path) -> None:
-    """A speed that is no number ends the run with R607."""
-    cell = blind(tmp_path)
-
-    class Broken(PhysicsCell):
-        def advance(self, now: float) -> Mishap | None:
-            if now > 0.5:
-                self._data.qvel[-1] = np.nan
-            return super().advance(now)
-
-    assert failure(cell, hardware=Broken(cell)).diagnostic.code == "R607"
 
 
 def test_things_inside_each_other(tmp_path: Path) -> None:
@@ -279,36 +243,6 @@ def test_drawn_parts(tmp_path: Path) -> None:
 # ---- servo and forces ------------------------------------------------------------------------------------------------
 
 
-def heavier(arm: Arm, factor: float) -> Arm:
-    """An arm of which all links weigh more."""
-    links = tuple(attrs.evolve(it, mass=factor * it.mass, inertia=factor * it.inertia) for it in arm.links)
-    return attrs.evolve(arm, links=links)
-
-
-@pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
-def test_another_arm_than_believed(name: str) -> None:
-    """With masses a tenth wrong, friction a third wrong, encoders of 13 bits and a late reading, arms stay on track."""
-    arm = load_arm(name)
-    rough = tuple(
-        attrs.evolve(it, coulomb_forward=1.3 * it.coulomb_forward, coulomb_backward=0.7 * it.coulomb_backward)
-        for it in arm.motors
-    )
-    plant = attrs.evolve(heavier(arm, 1.1), motors=rough)
-    start = np.clip(np.array([0.2, -0.4, 0.3, 0.2, 0.9, 0.1]), arm.limits.lower * 0.9, arm.limits.upper * 0.9)
-    placed = CellArm(arm=arm, start=start, plant=plant, sensors=Sensors(counts=8192, delay=1))
-    cell = Cell(name="off", arms={"ARM_1": placed})
-    world = PhysicsCell(cell)
-    goal = np.clip(start + 0.3 * np.array([1, 1, 0.2, 1, 1, 1]), arm.limits.lower * 0.95, arm.limits.upper * 0.95)
-    world.start_motion("ARM_1", quintic(start, goal, 2.0), 0.0, np.eye(4))
-
-    assert world.advance(3.0) is None
-
-    stream = world.observations().measured[0]
-    error = np.abs(stream.q - stream.sent)
-    assert error.max() < 0.015
-    assert error[-200:].max() < 5e-3
-
-
 def test_a_law_of_its_own(tmp_path: Path) -> None:
     """A user's controller is asked at every tick; one that holds nothing lets the arm fall, which is told."""
     cell, asked = blind(tmp_path), []
@@ -325,24 +259,6 @@ def test_a_law_of_its_own(tmp_path: Path) -> None:
         PhysicsCell(cell, laws={"ARM_2": limp})
 
 
-def test_a_weight_on_the_tool(tmp_path: Path) -> None:
-    """A part in the hand is read as its weight, within 1 %, wherever the arm has taken it."""
-    cell = blind(tmp_path, ("mass_kg = 0.2", "mass_kg = 2"))
-    world = PhysicsCell(cell)
-    program = PROGRAM[: PROGRAM.index("  MOVE obj TO goal")] + "  MOVE ARM_1 TO stop WITH DEPARTURE = apo ;\nEND.\n"
-    run(cell, program, world)
-    arm = cell.arms["ARM_1"].arm
-    rng, now = np.random.default_rng(0), world.now
-    for _ in range(5):
-        q = world.sent_configuration("ARM_1", now)
-        goal = np.clip(q + rng.uniform(-0.15, 0.15, arm.n) * (1, 1, 0.3, 1, 1, 1), arm.limits.lower, arm.limits.upper)
-        world.start_motion("ARM_1", quintic(q, goal, 1.5), now, np.eye(4))
-        now += 2.5
-        assert world.advance(now) is None
-        force = world.contact_force("ARM_1", now)
-        np.testing.assert_allclose(force, (0, 0, -2 * 9.80665), atol=0.01 * 2 * 9.80665)
-
-
 def test_sensors_of_forces_and_efforts(tmp_path: Path) -> None:
     """A sensor of forces gives one reading in each of its periods; measured efforts have the noise of the file."""
     entries = "force = { rate_hz = 100, noise_N = 1, bias_N = 0.5 }\nsensors = { effort_noise_pct = 1 }\n"
@@ -351,12 +267,12 @@ def test_sensors_of_forces_and_efforts(tmp_path: Path) -> None:
     readings = []
     for tick in range(1, 1001):
         world.advance(tick * cell.period)
-        readings.append(world.contact_force("ARM_1", tick * cell.period))
+        readings.append(world.contact_wrench("ARM_1", tick * cell.period))
 
     changes = np.flatnonzero(np.diff(np.array(readings)[:, 2])) + 2
     assert (np.diff(changes) == 10).all()
-    np.testing.assert_allclose(np.mean(readings, axis=0), 0.5, atol=0.5)
-    assert 0.8 < np.std(np.array(readings)[::10]) < 1.2
+    np.testing.assert_allclose(np.mean(readings, axis=0)[:3], 0.5, atol=0.5)
+    assert 0.8 < np.std(np.array(readings)[::10, :3]) < 1.2
     tau = world.observations().measured[0].tau[200:]
     limits = cell.arms["ARM_1"].arm.limits.effort
     np.testing.assert_allclose(tau.std(axis=0), 0.01 * limits, rtol=0.2)

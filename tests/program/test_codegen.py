@@ -76,7 +76,7 @@ def test_every_statement() -> None:
     code = code_of(
         "VAR f, g : FRAME ; t : TRANS ; n : SCALAR ; BEGIN n = 60 ; t = (1,0,0,0,1,0,0,0,1,-1,-1,-1) ;"
         "Read Visions (f) ; AFFIX g TO f AT t ; AFFIX f TO station ; UNFIX f FROM STATION ; OPEN ARM-1 ; GRASP arm-01 ;"
-        "READ SYSTEM (arm_1) ; OPERATE Tool1 ; END."
+        "READ SYSTEM (arm_1) ; OPERATE Tool1 ; Zero Force arm-1 ; n = FORCE(X) + torque(y) ; END."
     )
 
     assert [(step.op.value, *step.operands) for step in code.instructions] == [
@@ -90,6 +90,10 @@ def test_every_statement() -> None:
         ("GRASP", "ARM_1"),
         ("READS", "ARM_1"),
         ("OPER", "TOOL1", "ON"),
+        ("ZEROF", "ARM_1"),
+        ("FORCE", "%1", "X"),
+        ("FORCE", "%2", "MY"),
+        ("ADD", "N", "%1", "%2"),
         ("STOP",),
     ]
     assert code.constants == (60.0, (1, 0, 0, 0, 1, 0, 0, 0, 1, -1, -1, -1))

@@ -248,15 +248,15 @@ def test_an_arm_that_is_stopped_in_the_way_of_another(tmp_path: Path) -> None:
 
 
 def test_imported_only_where_it_is_needed(tmp_path: Path) -> None:
-    """A cell with one arm and nothing to run into imports no engine."""
+    """A cell with one arm and nothing to run into imports neither the engine nor what checks collisions."""
     (tmp_path / "a.toml").write_text(ARM)
     (tmp_path / "b.toml").write_text(f"[scene]\n{TABLE}{ARM}")
     program = f"VAR a : FRAME ; BEGIN a = {down(0.45, 0.1, 0.25)} ; MOVE ARM_1 TO a ; END."
     script = (
         "import sys; from armwright.program import run; r = run(sys.argv[1], cell=sys.argv[2]);"
-        "print(r.checked is None, 'mujoco' in sys.modules)"
+        "print(r.checked is None, *(name in sys.modules for name in ('mujoco', 'armwright.physics.collisions')))"
     )
     (tmp_path / "p.rlo").write_text(program)
-    for name, answer in (("a", "True False"), ("b", "False True")):
+    for name, answer in (("a", "True False False"), ("b", "False True True")):
         command = [sys.executable, "-c", script, str(tmp_path / "p.rlo"), str(tmp_path / f"{name}.toml")]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == answer

@@ -26,11 +26,12 @@ NO_NAME = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
 SHALLOW = [path for path in (*ACCEPTED, *REJECTED) if path.parent.name != "depth"]
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *SHALLOW]
 WORDS = {
-    "NAME": ("f", "part", "slot", "n", "t", "hit", "visions", "mm", "x", "stop"),
+    "NAME": ("f", "part", "slot", "n", "t", "hit", "visions", "mm", "x", "stop", "zero", "force", "torque"),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),
     "ARM": ("ARM_1", "arm-2"),
     "VISIONS": ("VISIONS", "visions"),
+    "ZERO": ("ZERO", "zero"),
     "UNITNAME": DECLARABLE,
     "RELOP": ("<", "<=", "<>", ">=", ">"),
     "ADDOP": ("+", "-"),
@@ -78,7 +79,7 @@ def by_hand(text: str) -> tuple[bool, list[Diagnostic]]:
 def left_to_the_checker(node: object) -> bool:
     """Whether the parser has let through what only the checker refuses, because it can say more about it."""
     match node:
-        case tree.Open(arm=arm) | tree.ReadSystem(arm=arm) | tree.Grasp(arm=arm):
+        case tree.Open(arm=arm) | tree.ReadSystem(arm=arm) | tree.Grasp(arm=arm) | tree.ZeroForce(arm=arm):
             wrong = not isinstance(arm, tree.ArmName | None)
         case tree.Assign(target=child) | tree.Unfix(child=child):
             wrong = isinstance(child, tree.ArmName)

@@ -119,6 +119,18 @@ def test_sensors() -> None:
     ]
 
 
+def test_zero_force() -> None:
+    """ZERO and FORCE are words together, and names or a function elsewhere."""
+    assert coloured("zero  force zero force(force") == [
+        (Keyword.Pseudo, "zero"),
+        (Keyword.Pseudo, "force"),
+        (Keyword.Pseudo, "zero"),
+        (Keyword.Pseudo, "force"),
+        (Punctuation, "("),
+        (Name, "force"),
+    ]
+
+
 def test_functions_and_procedures() -> None:
     """What is called is a function; the language's own and what needs no declaration stand out."""
     assert coloured("PROCEDURE place ; xyz (place(world), xyz, station") == [

@@ -31,6 +31,7 @@ CELLS = {
     "around": "puma_cell",
     "peg": "peg_cell",
     "stack_by_vision": "vision_cell",
+    "insert_peg": "socket_cell",
     "hand_over": "two_arms",
     "hand_over_sideways": "two_arms",
 }

@@ -85,7 +85,7 @@ def test_what_the_compiler_makes(path: Path) -> None:
         ("calls", r"CALL   P \S+ \S+", "CALL   P 1.0", "P has 2 parameters, got 1 argument"),
         ("calls", r"CALL   P", "CALL   Q", "there is no procedure Q"),
         ("calls", r"CALL   P \S+", "CALL   P WORLD", "CALL expects a number, but WORLD is a pose or a transformation"),
-        ("guards", r"FORCE  (%\d+) Z", r"FORCE  \1 W", "FORCE expects the axis X, Y or Z, got W"),
+        ("guards", r"FORCE  (%\d+) Z", r"FORCE  \1 W", "FORCE expects the axis X, Y or Z, or MX, MY or MZ, got W"),
         ("guards", r"MVHLT", "QUIT", "QUIT cannot end an action"),
         ("guards", r"MVEND", "JOIN", "expected FORKs and their JOIN without other instructions in between"),
         ("guards", r"DIST   (%\d+)", r"PAUSE  1.0", "the operands of PAUSE have wrong kinds or a wrong number"),

@@ -34,6 +34,7 @@ class Gltf:
         self._buffer = content[28 + size :]
 
     def array(self, number: int) -> Array:
+        """The values of an accessor, a row each."""
         accessor = self.json["accessors"][number]
         view = self.json["bufferViews"][accessor["bufferView"]]
         width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]

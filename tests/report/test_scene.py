@@ -229,7 +229,9 @@ def planned_and_measured(error: Array) -> tuple[Stream, MeasuredStream]:
     planned = Stream(arm="ARM_1", t=times, q=q, qd=zeros, qdd=zeros, tau=zeros)
     at = 2.0 * t / t[-1] + error
     zero = np.zeros((len(t), 1))
-    return planned, MeasuredStream(arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero, sent=zero, opening=zero[:, 0])
+    return planned, MeasuredStream(
+        arm="ARM_1", t=t, q=at[:, None], qd=zero, tau=zero, sent=zero, actual=zero, opening=zero[:, 0]
+    )
 
 
 def test_spikes_of_the_tracking_error_survive() -> None:
@@ -392,7 +394,7 @@ def test_least_distances(visit, stocked: Recording) -> None:
 
     assert opened.page.locator("#clearance-head").is_visible()
     t = stocked.stages[0].t0 + 0.25
-    assert cells[0].inner_text().split("\n") == ["12.3 mm", f"ARM_1 link 4 – POST, {t:.2f} s"]
+    assert cells[0].inner_text().split("\n") == ["12.3 mm", f"ARM_1 link 4 – POST, {t:.2f}\u00a0s"]
     assert NASTY in cells[1].inner_text()
     assert [cell.inner_text() for cell in cells[2:]] == ["above 50 mm", "–"]
     assert ["over" in (cell.get_attribute("class") or "") for cell in cells] == [False, True, False, False]
@@ -413,13 +415,53 @@ def test_no_column_without_distances(visit, bench: RunPage) -> None:
 
 
 @pytest.mark.browser
+def test_errors_of_a_cell_with_physics(visit, stocked: Recording) -> None:
+    """The head of the page has the engine, the seed and the largest errors; nothing of a run without physics."""
+    facts = {
+        "engine": "MuJoCo",
+        "version": "4.0.1",
+        "seed": 7,
+        "tip": {"ARM_1": 5.36e-4, "ARM_2": 3e-16},
+        "slip": {"ARM_1": 7.8e-5, "ARM_2": 0.0},
+    }
+
+    assert page_of(stocked).physics == ""
+    text = visit(page_of(observed(stocked, facts=facts))).page.locator("header").inner_text()
+
+    told = (
+        "MuJoCo 4.0.1, seed 7; ARM_1: tip within 0.54 mm of where it was sent, parts within 0.078 mm in the hand; "
+        "ARM_2: tip within 0.001 mm of where it was sent"
+    )
+    assert told in " ".join(text.split())
+
+
+@pytest.mark.browser
+def test_long_lists_on_paper(visit, stocked: Recording) -> None:
+    """On paper the list of what happened is as long as it must be, and the table of stages is below it."""
+    page = visit(page_of(stocked), viewport={"width": 700, "height": 900}).page
+    page.emulate_media(media="print")
+    rows = "[...document.querySelectorAll('#trace button')].map((row) => row.getBoundingClientRect().bottom)"
+    below = "document.querySelector('#stages-card').getBoundingClientRect().top"
+
+    assert len(page.evaluate(rows)) > 5
+    assert max(page.evaluate(rows)) <= page.evaluate(below)
+
+
+@pytest.mark.browser
 def test_measured_beside_planned(visit, stocked: Recording) -> None:
     """Charts have a second curve and a row for the tracking error, its largest value named with its time."""
     stream = stocked.streams[0]
     off = np.zeros_like(stream.q)
     off[:, 0] = 2e-3 * np.sin(stream.t) * (stream.t < 3)
     measured = MeasuredStream(
-        arm=stream.arm, t=stream.t, q=stream.q + off, qd=stream.qd, tau=stream.tau, sent=stream.q, opening=0 * stream.t
+        arm=stream.arm,
+        t=stream.t,
+        q=stream.q + off,
+        qd=stream.qd,
+        tau=stream.tau,
+        sent=stream.q,
+        actual=stream.q,
+        opening=0 * stream.t,
     )
     opened = visit(page_of(observed(stocked, measured=(measured,))))
     plain = visit(page_of(stocked))
@@ -436,6 +478,55 @@ def test_measured_beside_planned(visit, stocked: Recording) -> None:
     # The other arm was not measured: it has its four charts, planned.
     opened.page.locator("#charts-card .arms button").nth(1).click()
     assert opened.page.locator(".chart:visible").count() == 4
+    assert opened.complaints == []
+
+
+@pytest.mark.browser
+def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
+    """Arms are drawn as measured, fingers as far open as they were, parts on their way; planned arms can be hidden."""
+    stream = stocked.streams[0]
+    arm = stocked.cell.arms[stream.arm]
+    off = np.zeros(stream.q.shape[1])
+    off[0] = 0.2
+    opening = np.linspace(0.01, 0.07, len(stream.t))
+    measured = MeasuredStream(
+        arm=stream.arm,
+        t=stream.t,
+        q=stream.q + off,
+        actual=stream.q + off,
+        qd=stream.qd,
+        tau=stream.tau,
+        sent=stream.q,
+        opening=opening,
+    )
+    # It stands for 1 s, and then goes 0.3 m in 0.02 s.
+    ends = homogeneous(np.eye(3), np.array([[0.5, 0, 0.1], [0.5, 0, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.1]]))
+    falls = PartTrack(times=(0.0, 1.0, 1.02, 2.0), arms=(None,) * 4, poses=tuple(ends))
+    opened = visit(page_of(observed(stocked, measured=(measured,), parts={"BLOCK": falls})))
+
+    def drawn(name: str) -> list[Array]:
+        return [np.array(it["pose"]) for it in opened.page.evaluate("armwright.bodies()") if it["name"] == name]
+
+    for row in (0, len(stream.t) // 2, len(stream.t) - 1):
+        opened.seek(float(stream.t[row]))
+        hand = np.linalg.inv(arm.base @ forward(arm.arm, stream.q[row] + off))
+        fingers = [hand @ np.array([*pose[9:], 1]) for pose in drawn(f"{stream.arm} finger")]
+        # Each finger is as far aside as half the opening and half its own thickness.
+        apart = abs(fingers[0][1] - fingers[1][1])
+        assert apart == pytest.approx(opening[row] + 0.01, abs=1e-3)
+        np.testing.assert_allclose(np.mean(fingers, axis=0)[:2], 0.0, atol=1e-3)
+    for t, y in ((0.5, 0.0), (1.0, 0.0), (1.01, 0.15), (1.5, 0.3)):
+        opened.seek(t)
+        assert drawn("BLOCK")[0][10] == pytest.approx(y, abs=1e-3)
+    joints = opened.page.locator("#readout")
+    assert joints.locator("h3").inner_text() == f"Joints of {stream.arm}, measured"
+    assert "mm open" in joints.inner_text()
+    before = opened.pixels()
+    opened.page.click("#planned")
+    assert opened.pixels() != before
+    opened.page.click("#planned")
+    assert opened.pixels() == before
+    assert not visit(page_of(stocked)).page.locator("#planned").is_visible()
     assert opened.complaints == []
 
 

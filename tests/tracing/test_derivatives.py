@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import Motor
-from armwright.dynamics.drives import joint_coulomb_friction
+from armwright.dynamics.drives import joint_friction_law
 from armwright.tracing.derivatives import forward_mode, jacobian, replaced, reverse_mode
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced, operation_count
-from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, round_half_even, select, sin, sqrt
 from oracles import graphs
 from samples import Sample
 
@@ -28,6 +28,8 @@ OPERATIONS: dict[str, Callable[[Scalar, Scalar], Scalar]] = {
     "sin": lambda x, _: sin(x),
     "cos": lambda x, _: cos(x),
     "sqrt": lambda x, y: sqrt(x * x + y * y),
+    "cbrt": lambda x, y: cbrt(x + y),
+    "exp": lambda x, y: exp(-(x * x) + 0.1 * y),
     "atan2": atan2,
     "absolute": lambda x, _: abs(x),
     "round": lambda x, y: y * round_half_even(x),
@@ -87,14 +89,19 @@ def test_random_equations(sample: Sample) -> None:
         (sqrt, 0.0, 0.0),
         (sqrt, -1.0, 0.0),
         (sqrt, 4.0, 0.25),
+        (cbrt, 0.0, 0.0),
+        (cbrt, -8.0, 1 / 12),
+        (exp, 0.0, 1.0),
         (lambda x: atan2(x, 0.0 * x), 0.0, 0.0),
         (lambda x: atan2(x, x), 0.0, 0.0),
         (lambda x: atan2(x, 2.0), 0.0, 0.5),
         (round_half_even, 0.5, 0.0),
         (lambda x: 1.0 * (x < 1.0), 1.0, 0.0),
         (lambda x: select(x > 0.0, x, 3.0 * x), 0.0, 3.0),
-        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.0, 0.0),
-        (lambda x: joint_coulomb_friction(Motor(coulomb_forward=2.0, coulomb_backward=3.0), x), 0.1, 0.0),
+        (lambda x: joint_friction_law(Motor(coulomb_forward=2.0, coulomb_backward=3.0)).dry(x, x), 0.0, 0.0),
+        (lambda x: joint_friction_law(Motor(coulomb_forward=2.0, coulomb_backward=3.0)).dry(x, x), 0.1, 0.0),
+        (lambda x: joint_friction_law(Motor(stribeck=2.0, stribeck_speed=0.5)).dry(x, x), 0.0, 0.0),
+        (lambda x: joint_friction_law(Motor(cube_root=2.0, offset=1.0)).smooth(x), 0.0, 2.0 * 1e-4 ** (-2 / 3)),
     ],
 )
 def test_edges(equation: Callable[[Scalar], Scalar], at: float, expected: float) -> None:

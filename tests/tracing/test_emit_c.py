@@ -24,9 +24,9 @@ from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.identifiers import identifier
-from armwright.tracing.scalar import Scalar, atan2, round_half_even, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, exp, round_half_even, sqrt
 from oracles import compilers
-from oracles.arms import of_all_kinds, random_arm
+from oracles.arms import of_all_kinds, random_arm, with_all_friction, with_springs
 from oracles.compilers import (
     COMPILERS,
     FMA,
@@ -133,6 +133,22 @@ def test_loops_of_long_arms(name: str, tmp_path: Path, sample: Sample) -> None:
     assert loops[0] or language == "cuda"
     assert not loops[0] or len(texts[1]) < 1.7 * len(texts[0])
     sample.record(f"rows of an arm of 20 joints with the processor's bits, {name}", rows, 0)
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+@pytest.mark.parametrize("joints", [3, 20])
+@pytest.mark.drawn(0.25)
+def test_friction_of_all_kinds(name: str, joints: int, tmp_path: Path, sample: Sample) -> None:
+    """Exponentials and cube roots of an arm's friction have the bits of the processor, in loops over links, too."""
+    rng = np.random.default_rng(sample.seed)
+    arm = with_springs(with_all_friction(random_arm(rng, joints), rng), rng)
+    arm = attrs.evolve(arm, motors=[attrs.evolve(motor, stribeck=1.0, cube_root=2.0) for motor in arm.motors])
+    names = ["inverse_dynamics", "forward_dynamics", "potential_energy"]
+    names += ["inverse_dynamics_derivatives", "regressor"] if joints < 5 else []
+
+    rows = assert_same_bits(name, arm, names, tmp_path, rng)
+
+    sample.record(f"rows of arms with friction of all kinds with the processor's bits, {name}", rows, 0)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "g++"])
@@ -282,19 +298,20 @@ def function_of(emitted: Emitted) -> Function:
 
 @pytest.mark.parametrize("header", [c_header, cpp_header], ids=["c", "cpp"])
 def test_whole_numbers_angles_and_flags(header: object, tmp_path: Path) -> None:
-    """Rounding, roots, arc tangents, flags, infinite constants and unused inputs compile without a warning."""
-    emitted = emit(
-        "all",
-        lambda x, _: [[round_half_even(x[0]), sqrt(x[1]), atan2(x[0], x[1]), x[0] * np.inf, abs(x[1])], [x[0] < x[1]]],
-        {"x": 2, "y": 1},
-        flags=(1,),
-    )
+    """Elementary functions, flags, infinite constants and unused inputs compile without a warning."""
+
+    def equation(x: list[Scalar], _: list[Scalar]) -> list[list[Scalar]]:
+        several = [round_half_even(x[0]), sqrt(x[1]), atan2(x[0], x[1]), x[0] * np.inf, abs(x[1])]
+        return [[*several, exp(x[1]), cbrt(2 * x[1])], [x[0] < x[1]]]
+
+    emitted = emit("all", equation, {"x": 2, "y": 1}, flags=(1,))
     text = header([function_of(emitted)])  # type: ignore[operator]
     language = header is cpp_header
     called = "armwright::of<double>" if language else "of"
     main = (
-        f"int main(void) {{ double x[2] = {{2.5, -4}}, y[1] = {{0}}, z[5]; unsigned char flag[1]; return !({called}(x, "
+        f"int main(void) {{ double x[2] = {{2.5, -4}}, y[1] = {{0}}, z[7]; unsigned char flag[1]; return !({called}(x, "
         "y, z, flag) == 0 && z[0] == 2 && z[1] == 0 && z[2] > 2.58 && z[2] < 2.59 && z[3] > 1e308 && z[4] == 4 "
+        "&& z[5] > 0.0183156 && z[5] < 0.0183157 && z[6] == -2 "
         "&& flag[0] == 0); }\n"
     )
     program = build("g++" if language else "gcc", text + main, tmp_path / "program")

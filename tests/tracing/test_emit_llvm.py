@@ -13,7 +13,7 @@ from armwright.dynamics.newton_euler import newton_euler
 from armwright.tracing.emit import Emitted, emit, emit_lanes
 from armwright.tracing.emit_llvm import MEANINGLESS, UNUSUAL, Target
 from armwright.tracing.native import function_address
-from armwright.tracing.scalar import Scalar, atan2, cos, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, sin, sqrt
 from oracles.graphs import evaluate_machine
 
 TARGETS = [Target(lanes, fma) for lanes in (8, 4, 2, 1) for fma in (True, False)]
@@ -128,7 +128,7 @@ def test_hostile_numbers(target: Target) -> None:
 
     def equation(x: list[Scalar], y: list[Scalar]) -> list[list[Scalar]]:
         a, b = x[0], y[0]
-        return [[atan2(a, b), sqrt(a), a * b + a, -a, abs(b), (a < b) + 1.0, sin(a) + cos(b)]]
+        return [[atan2(a, b), sqrt(a), a * b + a, -a, abs(b), (a < b) + 1.0, sin(a) + cos(b), cbrt(a), exp(b)]]
 
     emitted = emit("hostile", equation, {"x": 1, "y": 1})
     numbers = [0.0, -0.0, 5e-324, -5e-324, 2.3e-308, -1e-310, 1.0, -1.0, math.pi / 2, 1e11, -1e11]

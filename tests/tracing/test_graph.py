@@ -12,7 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.kinematics.jacobians import jacobian_columns
 from armwright.tracing.graph import Graph, Traced, operation_count, reachable
-from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, round_half_even, select, sin, sqrt
 from oracles.arms import random_arm
 from oracles.graphs import evaluate
 
@@ -75,14 +75,14 @@ expressions = st.recursive(
     st.sampled_from(["a", "b", "c", "0.0", "1.0", "-1.0", "2.5"]),
     lambda inner: st.one_of(
         st.tuples(inner, st.sampled_from("+-*"), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
-        st.tuples(st.sampled_from(["sin", "cos", "sqrt", "-"]), inner).map(lambda t: f"{t[0]}({t[1]})"),
+        st.tuples(st.sampled_from(["sin", "cos", "sqrt", "cbrt", "exp", "-"]), inner).map(lambda t: f"{t[0]}({t[1]})"),
         # Of points right of the y axis: elsewhere the angle depends on the sign of a zero, which is not kept.
         st.tuples(inner, inner).map(lambda t: f"atan2({t[0]}, 1.0 + {t[1]} * {t[1]})"),
         st.tuples(inner, inner, inner).map(lambda t: f"select({t[0]} < {t[1]}, {t[2]}, {t[0]})"),
     ),
     max_leaves=25,
 )
-SCOPE = {"sin": sin, "cos": cos, "sqrt": sqrt, "atan2": atan2, "select": select}
+SCOPE = {"sin": sin, "cos": cos, "sqrt": sqrt, "cbrt": cbrt, "exp": exp, "atan2": atan2, "select": select}
 
 
 @given(expressions, finite, finite, finite)

@@ -19,7 +19,7 @@ from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.door import ROWS_BETWEEN_SIGNALS
 from armwright.tracing.emit import emit
 from armwright.tracing.kernel import LANES, CalledOff, Kernel, _addresses, on_cores_for_long
-from armwright.tracing.scalar import Scalar, atan2, cos, sin
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, sin
 from oracles.arms import random_arm, random_configurations
 
 pytestmark = pytest.mark.usefixtures("own_cache")
@@ -80,6 +80,27 @@ def test_arc_tangent_to_two_units(circle: Kernel, rng: np.random.Generator) -> N
     axes = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0)])
     values = circle(axes[:, :1], axes[:, 1:])
     np.testing.assert_array_equal(values[:, 2], (0, math.pi / 2, math.pi, -math.pi / 2, 0))
+
+
+def test_exponentials_to_two_units(rng: np.random.Generator) -> None:
+    """The exponential function is within 2 units where it is a normal number, 0 below and infinite above."""
+    power = Kernel(emitted=emit("power", lambda x: [[exp(x[0])]], {"x": 1}))
+    x = np.concatenate(
+        [rng.uniform(-707, 709, 100_000), rng.uniform(-1, 1, 100_000), -(10 ** rng.uniform(-30, 0, 1000))]
+    )
+
+    assert _ulps(power(x[:, None])[:, 0], np.array([math.exp(v) for v in x])) <= 2
+    edges = power(np.array([[0.0], [-0.0], [-708.0], [-1e99], [709.8], [1e99]]))[:, 0]
+    np.testing.assert_array_equal(edges, (1, 1, 0, 0, math.inf, math.inf))
+
+
+def test_cube_roots_to_two_units(rng: np.random.Generator) -> None:
+    """Cube roots are within 2 units for magnitudes from 1e-307 to 1e100, and have the sign of the number."""
+    root = Kernel(emitted=emit("root", lambda x: [[cbrt(x[0])]], {"x": 1}))
+    x = 10 ** rng.uniform(-307, 100, 100_000) * rng.choice([-1.0, 1.0], 100_000)
+
+    assert _ulps(root(x[:, None])[:, 0], np.cbrt(x)) <= 2
+    np.testing.assert_array_equal(root(np.array([[0.0], [8.0], [-27.0], [1.0]]))[:, 0], (0, 2, -3, 1))
 
 
 def test_agrees_with_the_equation(stanford: Kernel, rng: np.random.Generator) -> None:

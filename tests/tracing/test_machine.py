@@ -11,7 +11,7 @@ from armwright.arrays import LARGEST, LARGEST_ANGLE
 from armwright.tracing.emit import Guarded, emit
 from armwright.tracing.graph import Graph, Traced
 from armwright.tracing.machine import MachineCode, Watched, fused, machine_code, scheduled, with_results
-from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, round_half_even, select, sin, sqrt
 from oracles.graphs import evaluate_machine
 
 LANGUAGE = {"add", "subtract", "multiply", "divide", "negate", "absolute", "sqrt", "less", "less_equal", "select"}
@@ -29,7 +29,7 @@ def one(equation: Callable[..., Scalar], inputs: int) -> MachineCode:
 
 
 def everything(x: Scalar, y: Scalar) -> Scalar:
-    turned = sin(3.0 * x) * cos(y - x) + atan2(y, x * y - 1.0)
+    turned = sin(3.0 * x) * cos(y - x) + atan2(y, x * y - 1.0) + cbrt(x - y) * exp(-(y * y))
     return select(abs(x) < y, sqrt(x * x + y * y) / (2.0 + turned), round_half_even(7.0 * y) - turned * turned)
 
 
@@ -66,7 +66,7 @@ def test_arc_tangent_of_zeros_of_either_sign() -> None:
             assert math.copysign(1.0, angle) == (-1.0 if y < 0 else 1.0)
 
 
-@pytest.mark.parametrize("equation", [sin, cos, sqrt, abs, lambda x: atan2(x, 0.5), lambda x: atan2(0.5, x)])
+@pytest.mark.parametrize("equation", [sin, cos, sqrt, cbrt, exp, abs, lambda x: atan2(x, 0.5), lambda x: atan2(0.5, x)])
 def test_what_is_no_number_goes_on(equation: Callable[[Scalar], Scalar]) -> None:
     """NaN within an equation comes out as NaN."""
     assert math.isnan(values(one(equation, 1), math.nan)[0])

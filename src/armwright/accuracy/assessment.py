@@ -20,7 +20,7 @@ from armwright.accuracy.settling_time import posing_time, settling
 from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
 from armwright.accuracy.weaving import weaving_deviation
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, one_of
+from armwright.errors import InvalidValueError, listed, one_of
 from armwright.files.result_table import ResultTable
 
 _AXES = "xyz"
@@ -61,8 +61,7 @@ class Assessment:
     def notes(self) -> list[str]:
         """What a reader must know beside the numbers."""
         names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
-        more = f" and {len(names) - _MAX_NAMED_TESTS} more" if len(names) > _MAX_NAMED_TESTS else ""
-        which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_MAX_NAMED_TESTS])}{more}"
+        which = "all tests" if len(names) == len(self.tests) else listed(names, _MAX_NAMED_TESTS)
         exceeded = ", ".join(sorted({measure.symbol for measure in self.exceeded}))
         notes = {
             f"planar reduction: {which} measured in a plane, without z; distances are computed in that plane": names,

@@ -24,7 +24,7 @@ _GRAVITY_FROM = {
     "world": "the gravity of the cell",
 }
 # Parameters of a drive that affect the motion of the joint.
-_DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
+_DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward", "offset", "stribeck", "cube_root")
 
 
 def tables(model: Arm) -> Iterator[ResultTable]:
@@ -47,6 +47,8 @@ def tables(model: Arm) -> Iterator[ResultTable]:
         yield _drive_table(model)
     else:
         yield ResultTable(title="Drives: no inertia or friction is known", heads=(), rows=())
+    if any(joint.spring.stiffness for joint in model.joints):
+        yield _spring_table(model)
 
 
 def facts(model: Arm) -> list[tuple[str, str]]:
@@ -133,13 +135,30 @@ def _inertia_table(model: Arm) -> ResultTable:
 
 def _drive_table(model: Arm) -> ResultTable:
     rows = []
+    # Terms that few arms have are shown where there are some.
+    names = {"offset": "offset", "Stribeck friction": "stribeck", "cube-root friction": "cube_root"}
+    others = [head for head, name in names.items() if model.motor_values(name).any()]
     for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
         forward, backward, units = motor.coulomb_forward, motor.coulomb_backward, joint.units
         coulomb = f"{forward:g}" if forward == backward else f"+{forward:g} / -{backward:g}"
         friction = f"{motor.viscous:g} {units.viscous}", f"{coulomb} {units.effort}"
-        rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, f"{motor.gear_ratio:g}"))
-    heads = ("joint", "inertia", "viscous", "Coulomb friction", "gear ratio")
+        values = {head: f"{getattr(motor, name):g} {units.effort}" for head, name in names.items()}
+        if motor.stribeck:
+            values["Stribeck friction"] += f", exp(-(v / {_position(joint, motor.stribeck_speed, '/s')})²)"
+        more = [values[head] for head in others]
+        rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, *more, f"{motor.gear_ratio:g}"))
+    heads = ("joint", "inertia", "viscous", "Coulomb friction", *others, "gear ratio")
     return ResultTable(title="Drives, reflected to the joint", heads=heads, rows=rows)
+
+
+def _spring_table(model: Arm) -> ResultTable:
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        if joint.spring.stiffness:
+            rows.append(
+                (str(i), f"{joint.spring.stiffness:g} {joint.units.stiffness}", _position(joint, joint.spring.rest))
+            )
+    return ResultTable(title="Springs at the joints", heads=("joint", "stiffness", "at rest at"), rows=rows)
 
 
 def _angle(value: float) -> str:

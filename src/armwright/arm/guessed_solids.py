@@ -1,4 +1,4 @@
-"""What an arm may look like of which only the joints are known: capsules along its Denavit-Hartenberg steps."""
+"""Guessed solids of an arm of which only the joints are known: capsules along its Denavit-Hartenberg steps."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous
+from armwright.spatial.rotations import rotation_with_z
 from armwright.spatial.shapes import Capsule, Solid, Sphere
 
 # The radius of the first link by the length of the arm, and of the last by that of the first.
@@ -48,11 +49,8 @@ def _capsule(a: Array, b: Array, radius: float) -> Solid:
     """Return the capsule from one point to another."""
     along = b - a
     length = float(np.linalg.norm(along))
-    z = along / length
-    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    x /= np.linalg.norm(x)
-    R = np.stack([x, np.cross(z, x), z], axis=1)
-    return Solid(shape=Capsule(radius=radius, length=length), pose=homogeneous(R, (a + b) / 2), guessed=True)
+    pose = homogeneous(rotation_with_z(along / length), (a + b) / 2)
+    return Solid(shape=Capsule(radius=radius, length=length), pose=pose, guessed=True)
 
 
 def _ball(radius: float) -> Solid:

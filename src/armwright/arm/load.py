@@ -10,13 +10,12 @@ import numpy as np
 
 from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
-from armwright.arm.mjcf.reader import load_mjcf
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
-from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path
@@ -43,7 +42,7 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
         packages: folders of packages, by name, in which the meshes of a URDF file are.
 
     Raises:
-        MissingExtraError: the file is URDF or MJCF, and lxml or MuJoCo is not installed.
+        MissingExtraError: the file is URDF, and lxml is not installed, or MJCF, and MuJoCo cannot be loaded.
         KindError: the name is neither a text nor a path.
         UnknownNameError: the catalogue has no such arm; the nearest is named.
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
@@ -53,8 +52,14 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
     if is_path(name):
         suffix = Path(name).suffix.lower()
         if suffix in _URDF:
+            from armwright.arm.urdf.reader import load_urdf  # noqa: PLC0415 - few arms are in such files
+
             return load_urdf(name, packages=packages)
-        return load_mjcf(name) if suffix == _MJCF else read_arm(name)
+        if suffix == _MJCF:
+            from armwright.arm.mjcf.reader import load_mjcf  # noqa: PLC0415 - few arms are in such files
+
+            return load_mjcf(name)
+        return read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
@@ -148,6 +153,7 @@ def _joint(table: Table) -> Joint:
     table.allow("fixed")
     units = ANGLE if kind == "revolute" else LENGTH
     effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
+    spring = table.table("spring")
     values = {
         "lower": number_in(limits, "lower", units, default=-math.inf),
         "upper": number_in(limits, "upper", units, default=math.inf),
@@ -175,6 +181,7 @@ def _joint(table: Table) -> Joint:
         alpha=number_in(table, "alpha", ANGLE, default=0.0),
         fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
         limits=Limits(**values),
+        spring=_spring(spring, units),
         name=table.text("name", default=""),
     )
 
@@ -204,6 +211,15 @@ def _link(table: Table) -> Link:
     return Link(mass=mass, com=com, inertia=inertia, name=name, solids=solids)
 
 
+def _spring(table: Table, units: dict[str, float]) -> Spring:
+    key = "stiffness_Nm_per_rad" if units is ANGLE else "stiffness_N_per_m"
+    spring = Spring(
+        stiffness=table.number(key, default=0.0, lower=0.0), rest=number_in(table, "rest", units, default=0.0)
+    )
+    table.refuse_unknown_keys()
+    return spring
+
+
 def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
     ratio = table.positive("gear_ratio", default=1.0)
     inertia = table.number("inertia_kgm2" if revolute else "inertia_kg", default=0.0, lower=0.0)
@@ -213,12 +229,22 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
             raise table.error("rotor_inertia_kgm2", message)
         inertia = table.number("rotor_inertia_kgm2", lower=0.0) * ratio**2
     force = "Nm" if revolute else "N"
+    speed = per(ANGLE if revolute else LENGTH, "per_s")
+    stribeck = table.number(f"stribeck_{force}", default=0.0, lower=0.0)
+    stribeck_speed = number_in(table, "stribeck_speed", speed, default=0.0, positive=True)
+    if stribeck and not stribeck_speed:
+        keys = " or ".join(f"stribeck_speed_{unit}" for unit in speed)
+        raise table.error(f"stribeck_{force}", f"how it fades is missing: specify {keys}, at which 1/e of it is left")
     motor = Motor(
         inertia=inertia,
         gear_ratio=ratio,
         viscous=table.number("viscous_Nms" if revolute else "viscous_Ns_per_m", default=0.0, lower=0.0),
         coulomb_forward=table.number(f"coulomb_forward_{force}", default=0.0, lower=0.0),
         coulomb_backward=table.number(f"coulomb_backward_{force}", default=0.0, lower=0.0),
+        offset=table.number(f"offset_{force}", default=0.0),
+        stribeck=stribeck,
+        stribeck_speed=stribeck_speed,
+        cube_root=table.number(f"cube_root_{force}", default=0.0, lower=0.0),
     )
     table.refuse_unknown_keys()
     return motor

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 
 
 def mean_dry_friction(motor: Motor) -> float:
@@ -25,6 +26,10 @@ def lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
             f"{label}: Coulomb friction of {forward:g} {units.effort} forward and {backward:g} {units.effort} backward "
             f"is {mean:g} {units.effort} in both directions in the file"
         )
+    terms = {"offset": motor.offset, "Stribeck term": motor.stribeck, "cube-root term": motor.cube_root}
+    for name, value in terms.items():
+        if value:
+            yield f"{label}: the {name} of the friction, {value:g} {units.effort}, is not in the file"
     if math.isfinite(joint.limits.acceleration):
         largest = f"{joint.limits.acceleration:g} {units.position}/s²"
         yield f"{label}: the maximum acceleration, {largest}, is not in the file"

@@ -12,7 +12,7 @@ All quantities are SI and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sized
+from collections.abc import Iterable, Sized
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
@@ -20,6 +20,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs, of_its_bodies
+from armwright.arm.drive import Motor, Spring, check_numbers
 from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
@@ -31,7 +32,6 @@ from armwright.arrays import (
     Flags,
     array_key,
     exact_shape,
-    number,
     read_only,
     reduce_by_fields,
 )
@@ -51,14 +51,6 @@ _Part = TypeVar("_Part")
 STANDARD_GRAVITY = 9.80665
 # What an arm that stands upright feels of it, along the axes of its base, or the world [m/s²].
 UPRIGHT_GRAVITY = read_only(np.array((0.0, 0.0, -STANDARD_GRAVITY)))
-
-
-# What the numbers of a part must be, in words.
-_RANGES: dict[str, Callable[[float], bool]] = {
-    "finite": math.isfinite,
-    "above 0": lambda x: x > 0,
-    "0 or more": lambda x: 0 <= x < math.inf,
-}
 
 
 def _com(value: ArrayLike) -> Array:
@@ -92,17 +84,6 @@ def _inertia(value: ArrayLike) -> Array:
     return read_only((tensor + tensor.T) / 2)  # to the last bit, so that six numbers tell it
 
 
-def _check_numbers(part: Any, what: str, names: Iterable[str], must: str = "", largest: float = LARGEST) -> None:
-    """Make floats of fields that must be numbers, of one of ``_RANGES`` if any, while their part is being built."""
-    for name in names:
-        value = number(getattr(part, name), f"{what}: {name}")
-        if largest < abs(value) < math.inf:
-            raise InvalidValueError(f"{what}: {name} must not be larger than {largest:g}, got {value:g}")
-        if must and not _RANGES[must](value):
-            raise InvalidValueError(f"{what}: {name} must be {must}, got {value:g}")
-        object.__setattr__(part, name, value)
-
-
 @attrs.frozen(kw_only=True)
 class Limits:
     """What a joint may do. Positions [rad] or [m]; the others are magnitudes; infinite where nothing is known.
@@ -123,8 +104,8 @@ class Limits:
 
     def __attrs_post_init__(self) -> None:
         """Refuse limits that nothing can satisfy."""
-        _check_numbers(self, "limits", ("lower", "upper"))
-        _check_numbers(self, "limits", ("speed", "acceleration", "effort"), "above 0")
+        check_numbers(self, "limits", ("lower", "upper"))
+        check_numbers(self, "limits", ("speed", "acceleration", "effort"), "above 0")
         if not self.lower < self.upper:
             raise InvalidValueError(f"limits: lower {self.lower:g} must be below upper {self.upper:g}")
 
@@ -162,6 +143,7 @@ class Joint:
         alpha: twist about x [rad].
         fixed: (4, 4) transform behind the shift along z and before that along x; None for a row of four numbers.
         limits: what the joint may do.
+        spring: what pulls it to a position; one of stiffness 0 where there is none.
         name: as its file calls it; empty where it has none.
     """
 
@@ -172,6 +154,7 @@ class Joint:
     alpha: float = 0.0
     fixed: Array | None = attrs.field(default=None, converter=_fixed, eq=_content)
     limits: Limits = Limits()
+    spring: Spring = attrs.field(factory=Spring)
     name: str = ""
 
     __reduce__ = reduce_by_fields
@@ -182,8 +165,10 @@ class Joint:
             raise InvalidValueError(f"joint: expected kind revolute or prismatic, got {shown(self.kind)}")
         if not isinstance(self.limits, Limits):
             raise KindError(f"joint: expected limits to be Limits, got {shown(self.limits)}")
-        _check_numbers(self, "joint", ("d", "a"), "finite")
-        _check_numbers(self, "joint", ("theta", "alpha"), "finite", LARGEST_ANGLE)
+        if not isinstance(self.spring, Spring):
+            raise KindError(f"joint: expected spring to be a Spring, got {shown(self.spring)}")
+        check_numbers(self, "joint", ("d", "a"), "finite")
+        check_numbers(self, "joint", ("theta", "alpha"), "finite", LARGEST_ANGLE)
 
     @property
     def revolute(self) -> bool:
@@ -239,7 +224,7 @@ class Link:
 
     def __attrs_post_init__(self) -> None:
         """Refuse a negative mass, and a tensor that no body has."""
-        _check_numbers(self, "link", ("mass",), "0 or more")
+        check_numbers(self, "link", ("mass",), "0 or more")
         moments = impossible_moments(self.mass, self.com, self.inertia) if self.complete else None
         if moments is not None:
             raise InvalidValueError(
@@ -247,30 +232,6 @@ class Link:
                 "Specify the tensor about the centre of mass, not about the origin of the frame, and check its units "
                 "and the signs of its products; complete=False accepts a tensor of which not all moments are known"
             )
-
-
-@attrs.frozen(kw_only=True)
-class Motor:
-    """The drive of a joint, as felt at the joint.
-
-    Attributes:
-        inertia: of the rotor and gear at the load side [kg m²], or [kg] for a prismatic joint.
-        viscous: friction per speed [N m s] or [N s/m].
-        coulomb_forward: magnitude of Coulomb friction while the joint moves in the direction of q [N m] or [N].
-        coulomb_backward: the same, against the direction of q.
-        gear_ratio: turns of the motor per turn of the joint; for information, ``inertia`` has it already.
-    """
-
-    inertia: float = 0.0
-    viscous: float = 0.0
-    coulomb_forward: float = 0.0
-    coulomb_backward: float = 0.0
-    gear_ratio: float = 1.0
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse drives that give energy for nothing."""
-        _check_numbers(self, "motor", ("inertia", "viscous", "coulomb_forward", "coulomb_backward"), "0 or more")
-        _check_numbers(self, "motor", ("gear_ratio",))
 
 
 def _parts(value: Iterable[_Part], part_class: type[_Part], what: str) -> tuple[_Part, ...]:
@@ -359,7 +320,7 @@ class Arm:
         """Refuse an arm without joints, and a hand that goes nowhere."""
         if not self.joints:
             raise ShapeError(f"arm '{self.name}': expected at least one joint")
-        _check_numbers(self, f"arm '{self.name}'", ("reach", "tool_speed"), "above 0")
+        check_numbers(self, f"arm '{self.name}'", ("reach", "tool_speed"), "above 0")
         if self.gravity_from not in get_args(GravityFrom):
             known, got = ", ".join(get_args(GravityFrom)), shown(self.gravity_from)
             raise InvalidValueError(f"arm '{self.name}': expected gravity_from to be one of {known}, got {got}")

@@ -60,7 +60,7 @@ def shape_in(entry: Table, kind: str) -> Shape:
 
 
 def _mesh(entry: Table) -> Mesh:
-    """Read a mesh, and the convex pieces that count in its place in collisions."""
+    """Read a mesh, and the convex pieces that replace it in collisions."""
     from armwright.spatial.meshes.reader import UNITS, has_unit  # noqa: PLC0415 - few files have meshes
 
     unit = entry.choice("unit", UNITS) if "unit" in entry else None
@@ -80,11 +80,13 @@ def _mesh_file(entry: Table, key: str, name: str, unit: str | None) -> Mesh:
     from armwright.spatial.meshes.reader import read_mesh  # noqa: PLC0415 - few files have meshes
 
     try:
-        return read_mesh(file_below(entry.path.parent, name), unit=unit)
+        mesh = read_mesh(file_below(entry.path.parent, name), unit=unit)
     except InvalidValueError as error:
         raise entry.error("unit", str(error).removeprefix("unit: ")) from error
     except FileFormatError as error:
         raise entry.error(key, str(error)) from error
+    entry.add_amount("file_triangles", len(mesh.faces), key)
+    return mesh
 
 
 def _length(entry: Table, name: str) -> float:

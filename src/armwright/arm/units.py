@@ -14,6 +14,7 @@ class JointUnits(NamedTuple):
         effort: of its effort and of its Coulomb friction.
         inertia: of the inertia of its drive.
         viscous: of its friction per speed.
+        stiffness: of its spring.
         display: of a position as people read it.
         scale: the position that one ``display`` unit is [rad] or [m].
     """
@@ -22,9 +23,10 @@ class JointUnits(NamedTuple):
     effort: str
     inertia: str
     viscous: str
+    stiffness: str
     display: str
     scale: float
 
 
-REVOLUTE = JointUnits("rad", "N m", "kg m²", "N m s", "deg", math.pi / 180)
-PRISMATIC = JointUnits("m", "N", "kg", "N s/m", "mm", 1e-3)
+REVOLUTE = JointUnits("rad", "N m", "kg m²", "N m s", "N m/rad", "deg", math.pi / 180)
+PRISMATIC = JointUnits("m", "N", "kg", "N s/m", "N/m", "mm", 1e-3)

@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import body_names
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.positions import known_arm
 from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
@@ -75,6 +76,7 @@ def _lines(arm: Arm) -> Iterator[str]:
         if joint.fixed is not None:
             yield from _pose("joint.fixed", joint.fixed) if not np.array_equal(joint.fixed, np.eye(4)) else ()
         yield from _table("joint.limits", _limits(joint))
+        yield from _table("joint.spring", _spring(joint))
         yield from _body(arm, i, link)
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
     if arm.uncertainty is not None:
@@ -107,6 +109,12 @@ def _limits(joint: Joint) -> dict[str, float]:
     units = (position, position, f"{position}_per_s", f"{position}_per_s2", effort)
     limits = zip(attrs.asdict(joint.limits).items(), units, strict=True)
     return {f"{name}_{unit}": value for (name, value), unit in limits if math.isfinite(value)}
+
+
+def _spring(joint: Joint) -> dict[str, float]:
+    stiffness, rest = ("Nm_per_rad", "rad") if joint.revolute else ("N_per_m", "m")
+    values = {f"stiffness_{stiffness}": joint.spring.stiffness, f"rest_{rest}": joint.spring.rest}
+    return {key: value for key, value in values.items() if value}
 
 
 def _body(arm: Arm, i: int, link: Link) -> Iterator[str]:
@@ -169,12 +177,17 @@ def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
             f"arm '{arm.name}': {arm.joint_label(i - 1)} has the gear ratio {motor.gear_ratio:g}; "
             "an arm file needs one above 0"
         )
-    inertia, viscous, dry = ("kgm2", "Nms", "Nm") if joint.revolute else ("kg", "Ns_per_m", "N")
+    units = ("kgm2", "Nms", "Nm", "rad_per_s") if joint.revolute else ("kg", "Ns_per_m", "N", "m_per_s")
+    inertia, viscous, dry, speed = units
     values = {
         f"inertia_{inertia}": motor.inertia,
         f"viscous_{viscous}": motor.viscous,
         f"coulomb_forward_{dry}": motor.coulomb_forward,
         f"coulomb_backward_{dry}": motor.coulomb_backward,
+        f"offset_{dry}": motor.offset,
+        f"stribeck_{dry}": motor.stribeck,
+        f"stribeck_speed_{speed}": motor.stribeck_speed,
+        f"cube_root_{dry}": motor.cube_root,
     }
     values = {key: value for key, value in values.items() if value}
     return values if motor.gear_ratio == 1 else {**values, "gear_ratio": motor.gear_ratio}

@@ -1,4 +1,4 @@
-"""Where an arm says that its hand is, and how far from there it may be: for pictures taken with the arm."""
+"""Where an arm says that its tool is, and how far from there it may be: for pictures taken with the arm."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ArmAccuracy:
     Attributes:
         position: of each coordinate of the tool [m].
         orientation: of rotations of the tool about each axis [rad].
-        joints: (n,) of each joint [rad] or [m], or one for all; in place of the two above.
+        joints: (n,) of each joint [rad] or [m], or one for all; instead of the two above.
     """
 
     position: float = attrs.field(default=1e-4, converter=_position)
@@ -56,7 +56,7 @@ class ArmAccuracy:
 class ArmReadings:
     """Joint positions of an arm, each with unknown corrections that its accuracy keeps small.
 
-    Corrections are counted in standard deviations: those of the pose of the hand, or of each joint.
+    Corrections are counted in standard deviations: those of the pose of the tool, or of each joint.
 
     Attributes:
         arm: with n joints.
@@ -82,13 +82,13 @@ class ArmReadings:
         return attrs.evolve(self, q=self.q[list(numbers)])
 
     def hand(self, corrections: Array) -> tuple[Array, Array]:
-        """Return the poses of the hand, and how corrections move it.
+        """Return the poses of the tool, and how corrections move it.
 
         Args:
             corrections: (m, k), in standard deviations.
 
         Returns:
-            (m, 4, 4) in the base frame, and (m, 6, k) twists of the hand.
+            (m, 4, 4) in the base frame, and (m, 6, k) twists of the tool.
         """
         if self.accuracy.joints is not None:
             deviations = one_or_each(self.accuracy.joints, self.arm.n, "standard deviations of the joints", "joint")

@@ -25,7 +25,7 @@ from armwright.calibration.measurements import Measurements
 from armwright.calibration.nongeometric import ModelComparison, NongeometricCalibration, calibrate_nongeometric
 from armwright.calibration.readings import Readings, refuse_unlocated
 from armwright.calibration.residuals import PoseError
-from armwright.errors import ContradictionError, InvalidValueError
+from armwright.errors import ContradictionError, InvalidValueError, listed
 from armwright.files.result_table import ResultTable
 from armwright.spatial.euler import to_rpy
 
@@ -276,9 +276,8 @@ def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str
         )
     yield from measurements.warnings
     if full.outliers:
-        names = ", ".join(measurements.names[fitted[i]] for i in full.outliers[:_MAX_NAMED])
-        more = f" and {len(full.outliers) - _MAX_NAMED} more" if len(full.outliers) > _MAX_NAMED else ""
-        yield f"outliers, without weight in the last fit: {names}{more}"
+        names = [measurements.names[fitted[i]] for i in full.outliers]
+        yield f"outliers, without weight in the last fit: {listed(names, _MAX_NAMED)}"
 
 
 def _note_on_held_out(held_out: HeldOutErrors, region: HeldOutErrors | None) -> str:

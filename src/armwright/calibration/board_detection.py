@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -12,7 +13,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.calibration.board import Board, BoardView, BoardViews, board_views
 from armwright.errors import FileFormatError, InvalidValueError, TooFewError, UnknownNameError
-from armwright.extras import import_extra
+from armwright.extras import opencv
 from armwright.files.inputs import file_path
 from armwright.files.limits import limit, limit_message
 from armwright.files.pictures import GreyPicture, read_grey_picture
@@ -20,6 +21,10 @@ from armwright.files.pictures import GreyPicture, read_grey_picture
 _PREFIX = "DICT_"
 # The least length of the side of a picture in which a board may be [px].
 _MIN_SIDE = 32
+# OpenCV takes some 200 bytes a pixel to look for a chessboard, so it looks in pictures of no more pixels than this.
+_MAX_PIXELS = 6_000_000
+# Corners found in a smaller picture are looked for within so many of its pixels, until they move by less [px].
+_AROUND, _STILL, _MOST_STEPS = 2, 1e-3, 40
 
 
 def board_finder(board: Board) -> Callable[[str, GreyPicture], BoardView | None]:
@@ -36,7 +41,7 @@ def board_finder(board: Board) -> Callable[[str, GreyPicture], BoardView | None]
         InvalidValueError: the dictionary has too few markers.
         MissingExtraError: OpenCV is not installed.
     """
-    cv2 = import_extra("cv2", "calibrating a camera", "physics", "opencv-python-headless")
+    cv2 = opencv("calibrating a camera")
     if board.marker is None:
         return lambda name, picture: _find_chessboard(cv2, board, name, picture)
     detector = cv2.aruco.CharucoDetector(_charuco_board(cv2, board))
@@ -80,11 +85,11 @@ def views_of_pictures(
             first = f"{size[0]} x {size[1]} pixels as in {Path(paths[0]).name}"
             message = f"expected {first}, got {width} x {height}; all pictures must be from one camera at one setting"
             raise FileFormatError(path, None, "", message)
-        found = find(path.name, picture)
-        if found is None:
+        view = find(path.name, picture)
+        if view is None:
             missing[path.name] = "the board is not found"
         else:
-            views.append(found)
+            views.append(view)
     if not views:
         raise TooFewError(
             f"the board is not found in any of {len(paths)} pictures; check the numbers of squares (columns x rows, "
@@ -134,10 +139,18 @@ def _find_charuco(detector: Any, name: str, picture: GreyPicture) -> BoardView |
 def _find_chessboard(cv2: ModuleType, board: Board, name: str, picture: GreyPicture) -> BoardView | None:
     size = board.columns - 1, board.rows - 1
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-    done, corners = cv2.findChessboardCornersSB(picture, size, flags=flags)
+    shrink = math.ceil(math.sqrt(picture.size / _MAX_PIXELS))
+    height, width = picture.shape
+    smaller = width // shrink, height // shrink
+    small = picture if shrink == 1 else cv2.resize(picture, smaller, interpolation=cv2.INTER_AREA)
+    done, corners = cv2.findChessboardCornersSB(small, size, flags=flags)
     if not done:
         return None
     pixels = _pixels(corners)
+    if shrink > 1:
+        near = ((pixels + 0.5) * (width / smaller[0], height / smaller[1]) - 0.5).astype(np.float32)
+        criteria = cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, _MOST_STEPS, _STILL
+        pixels = _pixels(cv2.cornerSubPix(picture, near, (_AROUND * shrink,) * 2, (-1, -1), criteria))
     if not board.looks_the_same_upside_down and _first_square_is_white(board, picture, pixels):
         pixels = pixels[::-1]
     return BoardView(name=name, corners=np.arange(len(pixels)), pixels=pixels)

@@ -16,7 +16,7 @@ from armwright.calibration.board import BoardViews
 from armwright.calibration.camera_intrinsics import LENS_NUMBERS, CameraIntrinsics, calibrate_intrinsics
 from armwright.calibration.camera_tables import PictureJoints
 from armwright.calibration.hand_eye import HandEyeCalibration, calibrate_hand_eye
-from armwright.errors import InvalidValueError, counted
+from armwright.errors import InvalidValueError, counted, listed
 from armwright.files.result_table import ResultTable
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.lens import Lens
@@ -83,28 +83,28 @@ class CameraCalibration:
         else:
             yield from (f"left out: {name}: {reason}" for name, reason in self.views.left_out.items())
         if self.without_joints:
-            yield f"pictures without joint positions: {_listed(self.without_joints)}"
+            yield f"pictures without joint positions: {listed(self.without_joints, _MAX_NAMED)}"
         if self.hand_eye is None:
             return
-        found = self.hand_eye
-        if found.wrong:
-            wrong = _listed([found.names[i] for i in found.wrong])
+        fit = self.hand_eye
+        if fit.wrong:
+            wrong = listed([fit.names[i] for i in fit.wrong], _MAX_NAMED)
             yield f"pictures that contradict the others, without weight: {wrong}"
-        accuracy = found.readings.accuracy
+        accuracy = fit.readings.accuracy
         stated = (
             f"{accuracy.position * 1e3:g} mm and {accuracy.orientation * 1e3:g} mrad"
             if accuracy.joints is None
             else "the standard deviations of its joints"
         )
         yield (
-            f"the pictures are {found.disagreement:.2f} times as far from where the arm puts the camera as {stated} "
+            f"the pictures are {fit.disagreement:.2f} times as far from where the arm puts the camera as {stated} "
             f"and the noise of pixels explain; the standard errors are right if this is about 1"
         )
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units."""
         errors, halves = self.lens_errors
-        values = _lens_values(self.lens)
+        values = self.lens.numbers.tolist()
         data: dict[str, Any] = {
             "camera": self.name,
             "pictures": list(self.views.names),
@@ -131,7 +131,7 @@ class CameraCalibration:
     def tables(self) -> Iterator[ResultTable]:
         """Give the lens, the pose of the camera and of the board, and the pictures."""
         errors, halves = self.lens_errors
-        rows = zip(LENS_NUMBERS, _lens_values(self.lens), errors, halves, strict=True)
+        rows = zip(LENS_NUMBERS, self.lens.numbers, errors, halves, strict=True)
         yield ResultTable(
             title=f"Lens of {self.name}, {self.lens.width} x {self.lens.height} pixels",
             heads=("number", "estimate", "standard error", "95 % ±"),
@@ -144,10 +144,10 @@ class CameraCalibration:
 
     def cell_lines(self) -> str:
         """Return the lines of a cell file for this camera."""
-        lens, found = self.lens, self.hand_eye
+        lens, fit = self.lens, self.hand_eye
         lines = [f"[cameras.{self.name}]"]
-        if found is not None:
-            if found.eye_in_hand:
+        if fit is not None:
+            if fit.eye_in_hand:
                 lines += [
                     "# The pose is in the frame of the tool: columns n, o, a, p; z is the axis of the lens.",
                     'on = "ARM_1"',
@@ -156,7 +156,7 @@ class CameraCalibration:
                 lines.append(
                     "# The pose is in the base frame of the arm: columns n, o, a, p; z is the axis of the lens."
                 )
-            lines.append(f"pose = {_numbers_text(to_noap(found.camera))}")
+            lines.append(f"pose = {_numbers_text(to_noap(fit.camera))}")
         lines += [
             f"width = {lens.width}",
             f"height = {lens.height}",
@@ -169,9 +169,9 @@ class CameraCalibration:
     def _picture_table(self) -> ResultTable:
         alone = self.intrinsics
         rms = {} if alone is None else dict(zip(alone.views.names, alone.rms_by_picture.tolist(), strict=True))
-        found = self.hand_eye
-        arm = {} if found is None else dict(zip(found.names, found.by_picture.tolist(), strict=True))
-        wrong = set() if found is None else {found.names[i] for i in found.wrong}
+        fit = self.hand_eye
+        arm = {} if fit is None else dict(zip(fit.names, fit.by_picture.tolist(), strict=True))
+        wrong = set() if fit is None else {fit.names[i] for i in fit.wrong}
         rows = [
             (
                 view.name,
@@ -214,7 +214,7 @@ def calibrate_camera(
         arm: that moved the camera or the board.
         joints: its positions at the pictures; None for the lens alone.
         accuracy: of the arm.
-        eye_in_hand: whether the camera is on the hand and the board beside the arm; otherwise the other way round.
+        eye_in_hand: whether the camera is on the tool and the board beside the arm; otherwise vice versa.
         sigma: standard deviation of a coordinate of a corner [px]; estimated from the residuals if left out.
         progress: called with what is being done.
 
@@ -243,7 +243,7 @@ def calibrate_camera(
         progress("calibrating the pose of the camera")
     used = views if intrinsics is None else intrinsics.views
     present, q = joints.of(used.names)
-    found = calibrate_hand_eye(
+    fit = calibrate_hand_eye(
         used.take(present),
         ArmReadings(arm=arm, q=q, accuracy=accuracy or ArmAccuracy()),
         intrinsics=intrinsics,
@@ -254,23 +254,14 @@ def calibrate_camera(
     return CameraCalibration(
         name=name,
         views=views,
-        lens=found.lens,
+        lens=fit.lens,
         intrinsics=intrinsics,
-        hand_eye=found,
+        hand_eye=fit,
         without_joints=tuple(picture for i, picture in enumerate(used.names) if i not in present),
     )
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
-
-
-def _listed(names: list[str] | tuple[str, ...]) -> str:
-    more = f" and {len(names) - _MAX_NAMED} more" if len(names) > _MAX_NAMED else ""
-    return f"{', '.join(names[:_MAX_NAMED])}{more}"
-
-
-def _lens_values(lens: Lens) -> list[float]:
-    return [*lens.focal.tolist(), *lens.centre.tolist(), *lens.distortion.tolist()]
 
 
 def _numbers_text(values: Array) -> str:
@@ -289,16 +280,14 @@ def _estimate(value: float | None, error: float, half: float) -> dict[str, float
     return {**data, "lower": value - float(half), "upper": value + float(half)}
 
 
-def _frames(found: HandEyeCalibration) -> tuple[str, str]:
+def _frames(fit: HandEyeCalibration) -> tuple[str, str]:
     """Return the frames that the poses of camera and board are in."""
-    return ("tool", "base") if found.eye_in_hand else ("base", "tool")
+    return ("tool", "base") if fit.eye_in_hand else ("base", "tool")
 
 
-def _pose_tables(found: HandEyeCalibration) -> Iterator[ResultTable]:
-    errors, halves = found.standard_errors, found.half_widths
-    for start, body, X, frame in zip(
-        (0, 6), ("Camera", "Board"), (found.camera, found.board), _frames(found), strict=True
-    ):
+def _pose_tables(fit: HandEyeCalibration) -> Iterator[ResultTable]:
+    errors, halves = fit.standard_errors, fit.half_widths
+    for start, body, X, frame in zip((0, 6), ("Camera", "Board"), (fit.camera, fit.board), _frames(fit), strict=True):
         rows = []
         for i, axis in enumerate(_AXES):
             k = start + i
@@ -315,20 +304,20 @@ def _pose_tables(found: HandEyeCalibration) -> Iterator[ResultTable]:
         )
 
 
-def _hand_eye_data(found: HandEyeCalibration) -> dict[str, Any]:
-    poses = [*found.camera[:3, 3].tolist(), None, None, None, *found.board[:3, 3].tolist(), None, None, None]
-    errors, halves = found.standard_errors[:12].tolist(), found.half_widths[:12].tolist()
+def _hand_eye_data(fit: HandEyeCalibration) -> dict[str, Any]:
+    poses = [*fit.camera[:3, 3].tolist(), None, None, None, *fit.board[:3, 3].tolist(), None, None, None]
+    errors, halves = fit.standard_errors[:12].tolist(), fit.half_widths[:12].tolist()
     return {
-        "setup": "eye-in-hand" if found.eye_in_hand else "eye-to-hand",
-        "camera": found.camera.tolist(),
-        "board": found.board.tolist(),
+        "setup": "eye-in-hand" if fit.eye_in_hand else "eye-to-hand",
+        "camera": fit.camera.tolist(),
+        "board": fit.board.tolist(),
         "errors": {
             name: _estimate(value, error, half)
             for name, value, error, half in zip(POSE_NUMBERS, poses, errors, halves, strict=True)
         },
-        "covariance": found.covariance.tolist(),
-        "sigma_px": found.sigma,
-        "disagreement": found.disagreement,
-        "by_picture": dict(zip(found.names, found.by_picture.tolist(), strict=True)),
-        "wrong_pictures": [found.names[i] for i in found.wrong],
+        "covariance": fit.covariance.tolist(),
+        "sigma_px": fit.sigma,
+        "disagreement": fit.disagreement,
+        "by_picture": dict(zip(fit.names, fit.by_picture.tolist(), strict=True)),
+        "wrong_pictures": [fit.names[i] for i in fit.wrong],
     }

@@ -15,8 +15,9 @@ from scipy.stats import t as student
 from armwright.arrays import Array, integer
 from armwright.calibration.board import BoardView, BoardViews, board_views
 from armwright.errors import InvalidValueError, TooFewError, counted
-from armwright.extras import import_extra
+from armwright.extras import opencv
 from armwright.spatial.lens import Lens
+from armwright.spatial.poses import homogeneous
 
 # The numbers of a lens, in the order of its attributes.
 LENS_NUMBERS = ("focal.x", "focal.y", "centre.x", "centre.y", "k1", "k2", "p1", "p2", "k3")
@@ -69,11 +70,6 @@ class CameraIntrinsics:
     wrong_corners: int
 
     @property
-    def values(self) -> Array:
-        """(9,) focal lengths, centre, distortion."""
-        return np.concatenate([self.lens.focal, self.lens.centre, self.lens.distortion])
-
-    @property
     def half_widths(self) -> Array:
         """(9,) half of the 95 % intervals of the numbers, by Student's t."""
         factor = float(student.ppf((1 + _CONFIDENCE) / 2, self.degrees_of_freedom))
@@ -123,26 +119,26 @@ def calibrate_intrinsics(views: BoardViews, *, coefficients: int = 5) -> CameraI
     all_corners = len(views.pixels)
     left_out = 0
     for _ in range(_ROUNDS):
-        found = _estimate(views, coefficients)
-        better, removed = _without_wrong(found)
+        estimate = _estimate(views, coefficients)
+        better, removed = _without_wrong(estimate)
         left_out += removed
         if better is views:
             break
         if len(better) < MIN_PICTURES or len(better.pixels) < all_corners / 2:
             raise InvalidValueError(
                 f"half of the pictures or corners do not fit a camera: the median picture is "
-                f"{np.median(found.rms_by_picture):.2g} pixels off; is this the board, and did it stay flat?"
+                f"{np.median(estimate.rms_by_picture):.2g} pixels off; is this the board, and did it stay flat?"
             )
         views = better
-    _refuse_undetermined(found)
-    return attrs.evolve(found, wrong_corners=left_out)
+    _refuse_undetermined(estimate)
+    return attrs.evolve(estimate, wrong_corners=left_out)
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
 def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
-    cv2 = import_extra("cv2", "calibrating a camera", "physics", "opencv-python-headless")
+    cv2 = opencv("calibrating a camera")
     fixed = {
         0: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,
         2: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3,
@@ -160,9 +156,7 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     except cv2.error as error:
         raise _undetermined(views, None, None) from error
     values = np.concatenate([matrix[[0, 1, 0, 1], [0, 1, 2, 2]], np.ravel(distortion)[:5]])
-    poses = np.broadcast_to(np.eye(4), (len(views), 4, 4)).copy()
-    for pose, rotation, translation in zip(poses, rotations, translations, strict=True):
-        pose[:3, :3], pose[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
+    poses = homogeneous([cv2.Rodrigues(rotation)[0] for rotation in rotations], np.reshape(translations, (-1, 3)))
     errors = np.ravel(errors)[:9]
     low, high = np.multiply(_FOCAL_RANGE, max(size))
     largest = np.array([high, high, high, high, *[_MAX_DISTORTION] * 5])
@@ -199,15 +193,15 @@ def _estimate(views: BoardViews, coefficients: int) -> CameraIntrinsics:
     )
 
 
-def _refuse_undetermined(found: CameraIntrinsics) -> None:
-    normals = found.poses[:, :3, 2]
+def _refuse_undetermined(estimate: CameraIntrinsics) -> None:
+    normals = estimate.poses[:, :3, 2]
     tilt = math.acos(float(np.clip((normals @ normals.T).min(), -1, 1)))
     if tilt < _MIN_TILT:
-        raise _undetermined(found.views, None, tilt)
-    error = float((found.standard_errors[:2] / found.lens.focal).max())
-    error *= max(1.0, _LEAST_SIGMA / max(found.sigma, 1e-12))
+        raise _undetermined(estimate.views, None, tilt)
+    error = float((estimate.standard_errors[:2] / estimate.lens.focal).max())
+    error *= max(1.0, _LEAST_SIGMA / max(estimate.sigma, 1e-12))
     if error > _MAX_FOCAL_ERROR:
-        raise _undetermined(found.views, error, tilt)
+        raise _undetermined(estimate.views, error, tilt)
 
 
 def _undetermined(views: BoardViews, error: float | None, tilt: float | None) -> InvalidValueError:
@@ -222,13 +216,13 @@ def _undetermined(views: BoardViews, error: float | None, tilt: float | None) ->
     )
 
 
-def _without_wrong(found: CameraIntrinsics) -> tuple[BoardViews, int]:
+def _without_wrong(estimate: CameraIntrinsics) -> tuple[BoardViews, int]:
     """Return the pictures without corners that are far off, and how many; or the same pictures, if there are none.
 
     A corner that is far off pulls the others of its picture along. Those that are half as far off as the worst are left
     out, and the others are looked at again; a picture goes as a whole where most corners are off alike.
     """
-    views, distances = found.views, np.linalg.norm(found.residuals, axis=1)
+    views, distances = estimate.views, np.linalg.norm(estimate.residuals, axis=1)
     # The median of the distances of a normal distribution in the plane is 1.1774 standard deviations.
     limit = _CORNER_LIMIT * max(float(np.median(distances)), 1e-6) / 1.1774
     kept, left_out, count = list[BoardView](), dict(views.left_out), 0

@@ -1,4 +1,4 @@
-"""Hand-eye calibration: where a camera is on the hand of an arm, or beside the arm, from pictures of a board.
+"""Hand-eye calibration: where a camera is on the tool of an arm, or beside the arm, from pictures of a board.
 
 The corners in the pictures have noise, and so have the positions of the arm. Both count by their standard deviations in
 one least-squares fit over the poses of camera and board, the corrections of the arm in each picture, and the numbers of
@@ -24,7 +24,7 @@ from armwright.calibration.board import BoardViews
 from armwright.calibration.camera_intrinsics import CameraIntrinsics
 from armwright.calibration.hand_eye_fit import HandEyeFit, HandEyeProblem, HandEyeState
 from armwright.calibration.hand_eye_start import MIN_PICTURES, check_motions, hand_eye_start
-from armwright.calibration.reprojection import BoardPose, first_board_pose, refined_board_pose, twist_between
+from armwright.calibration.reprojection import BoardPose, board_pose, refined_board_pose, twist_between
 from armwright.errors import ContradictionError, ShapeError
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import inverse
@@ -50,7 +50,7 @@ class HandEyeCalibration:
     """The poses of a camera and a board by an arm.
 
     Attributes:
-        eye_in_hand: whether the camera is on the hand and the board beside the arm; otherwise the other way round.
+        eye_in_hand: whether the camera is on the tool and the board beside the arm; otherwise vice versa.
         camera: (4, 4) pose of the camera in the frame of the tool, or in the base frame.
         board: (4, 4) pose of the board in the base frame, or in the frame of the tool.
         lens: of the camera.
@@ -123,20 +123,20 @@ def calibrate_hand_eye(
     eye_in_hand: bool = True,
     sigma: float | None = None,
 ) -> HandEyeCalibration:
-    """Estimate the pose of a camera on the hand of an arm, or beside the arm.
+    """Estimate the pose of a camera on the tool of an arm, or beside the arm.
 
     Args:
-        views: m pictures of a board, which is fixed beside the arm, or on its hand.
+        views: m pictures of a board, which is fixed beside the arm, or on its tool.
         readings: of the arm in these pictures.
         intrinsics: the lens as estimated from these or other pictures; its numbers are fitted together with the poses.
         lens: the lens where it is known; its numbers stay.
-        eye_in_hand: whether the camera is on the hand and the board beside the arm; otherwise the other way round.
+        eye_in_hand: whether the camera is on the tool and the board beside the arm; otherwise vice versa.
         sigma: standard deviation of a coordinate of a corner [px]; estimated from the residuals if left out.
 
     Raises:
         ShapeError: pictures and readings are not as many, or neither or both of intrinsics and lens are given.
         TooFewError: there are too few pictures.
-        InvalidValueError: the hand turns too little or about one direction only, so that the pose is not determined.
+        InvalidValueError: the tool rotates too little or about one direction only, so that the pose is not determined.
         ContradictionError: the pictures do not belong to these joint positions.
         MissingExtraError: OpenCV is not installed.
     """
@@ -149,10 +149,10 @@ def calibrate_hand_eye(
     X_BE = readings.hand(none)[0]
     check_motions(X_BE, eye_in_hand=eye_in_hand)
     carried = X_BE if eye_in_hand else inverse(X_BE)
-    seen = _board_poses(views, known, None)
+    boards = _board_poses(views, known, None)
     freedom: float = math.inf
     if sigma is None:
-        residuals = np.concatenate([found.residuals for found in seen])
+        residuals = np.concatenate([board.residuals for board in boards])
         freedom = residuals.size - 6 * len(views) if intrinsics is None else intrinsics.degrees_of_freedom
         sigma = math.sqrt(float(np.sum(residuals**2)) / freedom) if intrinsics is None else intrinsics.sigma
         # Corners that were computed have no noise, and the arm's would then be divided by nothing.
@@ -164,10 +164,10 @@ def calibrate_hand_eye(
         sigma=positive(sigma, "sigma", "px"),
         lens_numbers=() if intrinsics is None else intrinsics.fitted,
     )
-    camera, board, distances = hand_eye_start(carried, np.array([found.pose for found in seen]))
+    camera, board, distances = hand_eye_start(carried, np.array([board.pose for board in boards]))
     state = HandEyeState(camera=camera, board=board, lens=known, corrections=none)
     fit, used, squares = _fit_without_wrong(problem, state, _not_far(distances))
-    spread = _mean_square(squares[used], len(used))
+    spread = _mean_square(squares[used])
     _refuse_contradiction(views.names, used, spread)
     return HandEyeCalibration(
         eye_in_hand=eye_in_hand,
@@ -195,12 +195,9 @@ def _board_poses(views: BoardViews, lens: Lens, guesses: Array | None) -> list[B
     """Return the poses of the board that fit each picture best on its own."""
     points = views.board.points
     return [
-        refined_board_pose(
-            lens,
-            points[view.corners],
-            view.pixels,
-            first_board_pose(lens, points[view.corners], view.pixels) if guesses is None else guesses[i],
-        )
+        board_pose(lens, points[view.corners], view.pixels)
+        if guesses is None
+        else refined_board_pose(lens, points[view.corners], view.pixels, guesses[i])
         for i, view in enumerate(views.views)
     ]
 
@@ -220,10 +217,10 @@ def _fit_without_wrong(
     while True:
         part = problem.take(used)
         fit = part.fit(attrs.evolve(state, corrections=state.corrections[used] * 0.0))
-        found = _board_poses(problem.views, fit.state.lens, poses)
-        poses = np.array([one.pose for one in found])
-        squares = _disagreements(problem, fit.state, found)
-        limit = float(chi2.isf(_WRONG, 6)) * max(1.0, _median_square(squares[used], len(used)))
+        boards = _board_poses(problem.views, fit.state.lens, poses)
+        poses = np.array([board.pose for board in boards])
+        squares = _disagreements(problem, fit.state, boards)
+        limit = float(chi2.isf(_WRONG, 6)) * max(1.0, _median_square(squares[used]))
         agreeing = [int(i) for i in np.flatnonzero(squares <= limit)]
         tried.add(tuple(used))
         if agreeing == used or len(agreeing) < MIN_PICTURES or tuple(agreeing) in tried or len(tried) > _ROUNDS:
@@ -231,18 +228,18 @@ def _fit_without_wrong(
         used = agreeing
 
 
-def _disagreements(problem: HandEyeProblem, state: HandEyeState, found: Sequence[BoardPose]) -> Array:
-    """Return (m,) how far the hand is from where each picture alone puts it: squares, in its standard deviations."""
+def _disagreements(problem: HandEyeProblem, state: HandEyeState, boards: Sequence[BoardPose]) -> Array:
+    """Return (m,) how far the tool is from where each picture alone puts it: squares, in its standard deviations."""
     readings = problem.readings
-    hand, twists = readings.hand(np.zeros((len(found), readings.corrections)))
-    poses = np.array([one.pose for one in found])
+    hand, twists = readings.hand(np.zeros((len(boards), readings.corrections)))
+    poses = np.array([board.pose for board in boards])
     carried = state.camera @ poses @ inverse(state.board)
     by_picture = inverse(carried) if problem.eye_in_hand else carried
     twist = twist_between(hand, by_picture)
-    # A twist of the hand moves the board: of its frame, as seen from the hand.
+    # A twist of the tool moves the board: of its frame, as seen from the tool.
     frames = state.camera @ poses if problem.eye_in_hand else np.broadcast_to(state.board, poses.shape)
     by_board = _adjoint(frames)
-    pixels = np.linalg.pinv(np.array([one.information for one in found]) / problem.sigma**2, hermitian=True)
+    pixels = np.linalg.pinv(np.array([board.information for board in boards]) / problem.sigma**2, hermitian=True)
     covariance = twists @ np.swapaxes(twists, 1, 2) + by_board @ pixels @ np.swapaxes(by_board, 1, 2)
     return np.asarray(np.einsum("ki,ki->k", twist, np.linalg.solve(covariance, twist[..., None])[..., 0]))
 
@@ -256,21 +253,21 @@ def _adjoint(X: Array) -> Array:
     return result
 
 
-def _mean_square(squares: Array, count: int) -> float:
+def _mean_square(squares: Array) -> float:
     """Return the mean of squared disagreements, each of six numbers, twelve of which were fitted; about 1."""
-    return float(squares.sum()) / (6 * count - 12)
+    return float(squares.sum()) / (6 * len(squares) - 12)
 
 
-def _median_square(squares: Array, count: int) -> float:
+def _median_square(squares: Array) -> float:
     """Return the same by the median, which wrong pictures do not move."""
-    return float(np.median(squares) / chi2.ppf(0.5, 6)) * count / max(count - 2, 1)
+    return float(np.median(squares) / chi2.ppf(0.5, 6)) * len(squares) / max(len(squares) - 2, 1)
 
 
 def _refuse_contradiction(names: Sequence[str], used: list[int], spread: float) -> None:
     wrong = [name for i, name in enumerate(names) if i not in used]
     checks = (
         "check that the joint positions are those of these pictures, the arm, the length of the squares, and whether "
-        "the camera is on the hand or beside the arm"
+        "the camera is on the tool or beside the arm"
     )
     if len(wrong) > _MAX_WRONG * len(names):
         raise ContradictionError(

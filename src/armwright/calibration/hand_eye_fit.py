@@ -35,8 +35,8 @@ class HandEyeState:
     """The unknowns of a hand-eye calibration.
 
     Attributes:
-        camera: (4, 4) pose of the camera on the hand, or in the base frame.
-        board: (4, 4) pose of the board in the base frame, or on the hand.
+        camera: (4, 4) pose of the camera on the tool, or in the base frame.
+        board: (4, 4) pose of the board in the base frame, or on the tool.
         lens: of the camera.
         corrections: (m, k) of the arm in each picture, in standard deviations.
     """
@@ -68,7 +68,7 @@ class HandEyeProblem:
     Attributes:
         views: m pictures.
         readings: m of the arm.
-        eye_in_hand: whether the camera is on the hand and the board beside the arm; otherwise the other way round.
+        eye_in_hand: whether the camera is on the tool and the board beside the arm; otherwise vice versa.
         sigma: standard deviation of a coordinate of a corner [px].
         lens_numbers: numbers of the lens that are fitted: of focal x, y, centre x, y, k1, k2, p1, p2, k3.
     """
@@ -131,13 +131,12 @@ class HandEyeProblem:
         return float(np.sum((residuals / self.sigma) ** 2) + np.sum(state.corrections**2))
 
     def _moved(self, state: HandEyeState, step: Array, corrections: Array) -> HandEyeState:
-        lens = state.lens
-        numbers = np.concatenate([lens.focal, lens.centre, lens.distortion])
+        numbers = state.lens.numbers
         numbers[list(self.lens_numbers)] += step[12:]
         return HandEyeState(
             camera=moved(state.camera, step[:6]),
             board=moved(state.board, step[6:12]),
-            lens=attrs.evolve(lens, focal=numbers[:2], centre=numbers[2:4], distortion=numbers[4:]),
+            lens=state.lens.with_numbers(numbers),
             corrections=state.corrections + corrections,
         )
 

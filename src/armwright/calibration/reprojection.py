@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.extras import opencv
 from armwright.spatial.lens import Lens
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector, skew_matrix
 
 # Gauss and Newton's steps of a pose, and when no more are needed [m], [rad].
@@ -59,19 +61,21 @@ def transformed(X: Array, points: Array) -> Array:
     return np.asarray((X[..., :3, :3] @ points[..., None])[..., 0] + X[..., :3, 3])
 
 
-def first_board_pose(lens: Lens, points: Array, pixels: Array) -> Array:
-    """Return (4, 4) the pose of a board in the frame of the camera, without a guess, by OpenCV.
+def board_pose(lens: Lens, points: Array, pixels: Array) -> BoardPose:
+    """Return the pose of a board that fits a picture best, without a guess: by OpenCV, and refined.
 
     Args:
         lens: of the camera.
         points: (c, 3) of the board, in its plane z = 0 [m].
         pixels: (c, 2) where they are seen.
 
+    Raises:
+        MissingExtraError: OpenCV is not installed.
+
     Source:
         Collins & Bartoli (2014), Infinitesimal plane-based pose estimation.
     """
-    import cv2  # noqa: PLC0415 - an extra
-
+    cv2 = opencv("calibrating a camera")
     _, rotations, translations, errors = cv2.solvePnPGeneric(
         points, pixels, lens.matrix, lens.distortion, flags=cv2.SOLVEPNP_IPPE
     )
@@ -80,10 +84,9 @@ def first_board_pose(lens: Lens, points: Array, pixels: Array) -> Array:
     for rotation, translation, error in zip(rotations, translations, np.ravel(errors), strict=True):
         if error > limit:
             continue
-        X = np.eye(4)
-        X[:3, :3], X[:3, 3] = rotation_from_vector(np.ravel(rotation)), np.ravel(translation)
+        X = homogeneous(rotation_from_vector(np.ravel(rotation)), np.ravel(translation))
         candidates.append(refined_board_pose(lens, points, pixels, X))
-    return min(candidates, key=lambda found: float(np.sum(found.residuals**2))).pose
+    return min(candidates, key=lambda fit: float(np.sum(fit.residuals**2)))
 
 
 def refined_board_pose(lens: Lens, points: Array, pixels: Array, X_CO: Array) -> BoardPose:

@@ -1,4 +1,4 @@
-"""The cameras of a cell file, and what they look for."""
+"""The cameras of a cell file, and what they search for."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.entries import read_name, read_pose, refuse_too_many, to_pose
+from armwright.cell.entries import known_name, read_name, read_pose, refuse_too_many, to_pose
 from armwright.cell.scene import CAMERA, TABLE, Camera, Fixture, Marker, Part, Sight
-from armwright.errors import closest
 from armwright.files.document import Table
 from armwright.spatial.lens import Lens, simple_lens
 from armwright.spatial.poses import inverse_pose
@@ -18,6 +17,8 @@ from armwright.spatial.shapes import LARGEST_SIZE, Shape, Solid, contains, suppo
 
 # Sides of pictures [px], and how many pixels one may have.
 _SIDES, _MAX_PIXELS = (16, 4096), 4_194_304
+# How many pixels all cameras may have: where a lens distorts, each needs some 32 bytes.
+_MAX_ALL_PIXELS = 4 * _MAX_PIXELS
 _FOVY_DEG = (1.0, 150.0)
 _MAX_FOCAL = 1e6
 _MAX_DISTORTION = 10.0
@@ -51,14 +52,13 @@ def read_cameras(main: Table, others: Table, arms: Collection[str]) -> dict[str,
     for key in others:
         name = read_name(others, key, cameras)
         entry = others.table(key)
-        on = read_name(entry, "on", (), entry.text("on")) if "on" in entry else None
-        if on is not None and on not in arms:
-            near = closest(on, arms)
-            hint = f"; did you mean {near}?" if near else f"; there is {', '.join(arms)}" if arms else ""
-            raise entry.error("on", f"{on} is not an arm of the cell{hint}")
+        on = known_name(entry, "on", entry.text("on"), arms, "an arm") if "on" in entry else None
         entry.allow("on")
         cameras[name] = _camera(entry, name, read_pose(entry, "pose"), on)
         entry.refuse_unknown_keys()
+        pixels = sum(camera.lens.width * camera.lens.height for camera in cameras.values())
+        if pixels > _MAX_ALL_PIXELS:
+            raise entry.error("width", f"expected no more than {_MAX_ALL_PIXELS:,} pixels of all cameras together")
     return cameras
 
 
@@ -107,7 +107,7 @@ def read_visions(
     markers: Mapping[str, Marker],
     cameras: Mapping[str, Camera],
 ) -> tuple[dict[str, Sight], dict[str, tuple[Array, ...]]]:
-    """Read what a camera answers by frame: what it looks for, or a list of poses.
+    """Read what a camera answers by frame: what it searches for, or a list of poses.
 
     Raises:
         FileFormatError: there is no such part, marker or camera, or a pose is none.
@@ -135,19 +135,19 @@ def _sight(
     cameras: Mapping[str, Camera],
 ) -> Sight:
     if "part" in entry and "marker" in entry:
-        raise entry.error("marker", "a camera looks for a part or for a marker of the scene, not for both")
-    camera = _named(entry, "camera", cameras, "camera that takes pictures") if "camera" in entry else None
+        raise entry.error("marker", "a camera finds a part or a marker of the scene, not both")
+    camera = known_name(entry, "camera", entry.text("camera"), cameras, "a camera") if "camera" in entry else None
     if camera is None and cameras:
         camera = CAMERA if CAMERA in cameras else next(iter(cameras)) if len(cameras) == 1 else None
         if camera is None:
             raise entry.error("camera", f"missing; the cameras are {', '.join(cameras)}")
     entry.allow("camera", "on", "part", "marker")
     if "marker" in entry:
-        name = _named(entry, "marker", markers, "marker of the scene")
+        name = known_name(entry, "marker", entry.text("marker"), markers, "a marker")
         height = _height(entry, fixtures, float(markers[name].pose[2, 3]))
         relation = read_pose(entry, "at", np.eye(4))
         return Sight(kind="marker", name=name, camera=camera, height=height, relation=relation)
-    name = _named(entry, "part", parts, "part")
+    name = known_name(entry, "part", entry.text("part"), parts, "a part")
     height = _height(entry, fixtures, lowest(parts[name].shape, parts[name].pose))
     return Sight(kind="part", name=name, camera=camera, height=height, relation=parts[name].grasp)
 
@@ -155,15 +155,6 @@ def _sight(
 def lowest(shape: Shape, pose: Array) -> float:
     """Return the height of the lowest point of a solid at a pose (4, 4) [m]."""
     return float(pose[2, 3] - support(shape, -pose[2, :3]))
-
-
-def _named(entry: Table, key: str, known: Collection[str], what: str) -> str:
-    name = entry.text(key).upper()
-    if name not in known:
-        near = closest(name, known)
-        hint = f"; did you mean {near}?" if near else ""
-        raise entry.error(key, f"{name} is not a {what} of the cell{hint}")
-    return name
 
 
 def _height(entry: Table, fixtures: Mapping[str, Fixture], start: float) -> float | None:

@@ -16,7 +16,7 @@ class Servo:
     Attributes:
         bandwidth: natural frequency of the errors of each joint [rad/s].
         integral: whether errors that stay are integrated.
-        knows_parts: whether the controller is told of a part in the hand: its mass as the cell file has it.
+        knows_parts: whether the controller knows of a held part: its mass as the cell file has it.
         law: ``computed torque`` with the model of the arm, or ``pd`` with the weight of the arm taken off.
     """
 
@@ -31,8 +31,8 @@ class Sensors:
     """What an arm's controller knows of its joints.
 
     Attributes:
-        counts: of the encoder per turn of the motor, or per metre before the gear of a prismatic joint; 0 for exact
-            positions.
+        counts: of the encoder per revolution of the motor, or per metre before the gear of a prismatic joint; 0 for
+            exact positions.
         effort_noise: standard deviation of measured efforts, by the largest effort of each joint.
         delay: of all readings [servo ticks].
     """
@@ -49,16 +49,20 @@ class Sensors:
 
 @attrs.frozen(kw_only=True)
 class ForceSensor:
-    """The sensor of forces between an arm and its tool.
+    """The sensor of forces and moments between an arm and its tool.
 
     Attributes:
         noise: standard deviation of each force [N].
         bias: constant error of each force [N].
+        moment_noise: standard deviation of each moment [N m].
+        moment_bias: constant error of each moment [N m].
         rate: readings per second [1/s]; 0 for one at every servo tick.
     """
 
     noise: float = 0.0
     bias: float = 0.0
+    moment_noise: float = 0.0
+    moment_bias: float = 0.0
     rate: float = 0.0
 
 
@@ -70,7 +74,7 @@ class Alarms:
         touch: force with which an arm may press on what it should not [N].
         tracking_angle: how far a revolute joint may be from where it was sent [rad].
         tracking_length: how far a prismatic joint may be [m].
-        slip: how far a part may move in the hand [m].
+        slip: how far a part may move in the gripper [m].
     """
 
     touch: float = 20.0

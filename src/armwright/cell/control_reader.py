@@ -33,8 +33,11 @@ def read_servo(entry: Table) -> Servo:
 
 def read_sensors(entry: Table) -> Sensors:
     """Read what the controller of an arm knows of its joints."""
+    counts = entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12)
+    if 0.0 < counts < 1.0:
+        raise entry.error("encoder_counts", f"expected 1 or more, or 0 for exact positions, got {counts:g}")
     sensors = Sensors(
-        counts=entry.number("encoder_counts", default=0.0, lower=0.0, upper=1e12),
+        counts=counts,
         effort_noise=entry.number("effort_noise_pct", default=0.0, lower=0.0, upper=100.0) * 1e-2,
         delay=entry.whole("delay_ticks", 0, _MAX_DELAY, default=0),
     )
@@ -47,13 +50,15 @@ def read_force_sensor(entry: Table) -> ForceSensor:
     sensor = ForceSensor(
         noise=entry.number("noise_N", default=0.0, lower=0.0, upper=1e4),
         bias=entry.number("bias_N", default=0.0, lower=-1e4, upper=1e4),
+        moment_noise=entry.number("noise_Nm", default=0.0, lower=0.0, upper=1e4),
+        moment_bias=entry.number("bias_Nm", default=0.0, lower=-1e4, upper=1e4),
         rate=entry.number("rate_hz", default=0.0, lower=0.0, upper=1e5),
     )
     entry.refuse_unknown_keys()
     return sensor
 
 
-def read_plant(entry: Table, believed: Arm, folder: Path) -> Arm:
+def read_plant(entry: Table, model: Arm, folder: Path) -> Arm:
     """Read the arm that stands in the world, where it is another than the controller believes.
 
     Raises:
@@ -64,8 +69,8 @@ def read_plant(entry: Table, believed: Arm, folder: Path) -> Arm:
         arm = weighed(load_arm(regular_file(folder / name) if is_path(name) else name))
     except ArmwrightError as error:
         raise entry.error("model", str(error)) from error
-    if [joint.kind for joint in arm.joints] != [joint.kind for joint in believed.joints]:
-        kinds = ", ".join(joint.kind for joint in believed.joints)
+    if [joint.kind for joint in arm.joints] != [joint.kind for joint in model.joints]:
+        kinds = ", ".join(joint.kind for joint in model.joints)
         raise entry.error("model", f"expected an arm with the joints of the model ({kinds}), got '{arm.name}'")
     entry.refuse_unknown_keys()
     return arm

@@ -1,13 +1,15 @@
 """Entries that recur in cell files: names and poses."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.names import arm_name
+from armwright.cell.scene import Spread
+from armwright.errors import closest
 from armwright.files.document import Table
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import from_noap, homogeneous
@@ -34,12 +36,42 @@ def read_name(table: Table, key: str, taken: Iterable[str], text: str | None = N
     return name
 
 
+def known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
+    """Return a name under a key, in upper case, that must be one of those of the cell.
+
+    Args:
+        table: with the key.
+        key: for the message.
+        name: as it is written.
+        known: names of the cell.
+        kind: what they are, with its article, such as ``a part``.
+
+    Raises:
+        FileFormatError: it is none of them.
+    """
+    name = read_name(table, key, (), name)
+    if name not in known:
+        near = closest(name, known)
+        there = f"there is {', '.join(sorted(known))}" if known else "there is none"
+        raise table.error(key, f"{name} is not {kind} of the cell; {f'did you mean {near}?' if near else there}")
+    return name
+
+
 def read_pose(table: Table, key: str, default: Array | None = None) -> Array:
     """Return a pose (4, 4), written as twelve numbers; the default where the key is missing."""
     if default is not None and key not in table:
         table.allow(key)
         return default
     return to_pose(table, key, table.vector(key, 12))
+
+
+def read_spread(table: Table, position: str, yaw: str, tilt: str | None = None) -> Spread:
+    """Return how far from its place something may be, by the keys of its offset [mm] and of its rotations [deg]."""
+    return Spread(
+        position=table.number(position, default=0.0, lower=0.0, upper=1e6) * 1e-3,
+        yaw=np.radians(table.number(yaw, default=0.0, lower=0.0, upper=180.0)),
+        tilt=0.0 if tilt is None else np.radians(table.number(tilt, default=0.0, lower=0.0, upper=90.0)),
+    )
 
 
 def to_pose(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:

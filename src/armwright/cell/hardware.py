@@ -21,10 +21,12 @@ class PeakContact(NamedTuple):
     Attributes:
         depth: depth of penetration [m]; 0 without contact.
         force: contact force there [N].
+        body: the name of the body of the scene; empty for the plane of contact.
     """
 
     depth: float
     force: float
+    body: str = ""
 
 
 class Mishap(NamedTuple):
@@ -82,8 +84,19 @@ class Hardware(Protocol):
     def peak_contact(self, arm: str, now: float) -> PeakContact:
         """Return the deepest contact of the arm since its latest motion began, until now."""
 
-    def contact_force(self, arm: str, now: float) -> Array:
-        """Return the contact force (3,) on the arm and what it moves, along the axes of the world [N]."""
+    def contact_wrench(self, arm: str, now: float) -> Array:
+        """Return the wrench (6,) that the sensor of forces of an arm reads, along the axes of the world.
+
+        Force [N] and moment about the tool point [N m] on the tool and what it holds, less what was there when the
+        sensor was zeroed.
+        """
+
+    def zero_force(self, arm: str, now: float) -> Array:
+        """Let the wrench that the sensor of forces of an arm reads count as zero from now on.
+
+        Returns:
+            (6,) the wrench that counts as zero.
+        """
 
     def tool_wrenches(self, arm: str, now: float) -> Array:
         """Return the contact wrenches on the tool of an arm, (k, 6), at this servo tick and the following ones.

@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight
+from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
@@ -99,11 +99,12 @@ class Cell:
         arms: by name, such as ``ARM_1``; the gravity of each model is that of the cell, along the axes of its base.
         gravity: (3,) acceleration of free fall along the axes of the world [m/s²].
         frames: by name, in upper case.
+        spreads: how far from where programs believe it a frame, and what stands on it, may be in a world, by name.
         fixtures: bodies that stand where they are, by name.
         parts: bodies that grippers hold and move, by name.
         markers: of the scene, by name, with their poses in the world.
         cameras: that take pictures, by name.
-        sights: by frame name, what a camera looks for: parts, and markers of the scene.
+        sights: by frame name, what a camera searches for: parts, and markers of the scene.
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
@@ -126,6 +127,7 @@ class Cell:
     arms: Mapping[str, CellArm]
     gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_as_gravity)
     frames: Mapping[str, Node] = attrs.field(factory=dict)
+    spreads: Mapping[str, Spread] = attrs.field(factory=dict)
     fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)
     parts: Mapping[str, Part] = attrs.field(factory=dict)
     markers: Mapping[str, Marker] = attrs.field(factory=dict)

@@ -17,10 +17,11 @@ class MeasuredStream:
     Attributes:
         arm: its name.
         t: (k,) times [s].
-        q: (k, n) joint positions [rad] or [m].
-        qd: (k, n) joint speeds.
+        q: (k, n) joint positions, as the sensors read them [rad] or [m].
+        qd: (k, n) joint speeds, as the sensors read them.
         tau: (k, n) efforts of the motors [N m] or [N].
         sent: (k, n) joint positions that the arm was sent to.
+        actual: (k, n) joint positions as they were in the world.
         opening: (k,) distance between the fingers [m].
     """
 
@@ -30,6 +31,7 @@ class MeasuredStream:
     qd: Array
     tau: Array
     sent: Array
+    actual: Array
     opening: Array
 
 

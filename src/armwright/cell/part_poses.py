@@ -1,4 +1,4 @@
-"""Where the parts of a cell are believed to be: in the world, or on the hand of an arm."""
+"""Where the parts of a cell are believed to be: in the world, or held by an arm."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class PartTrack:
 
     Attributes:
         times: from when on each of the following holds [s], from 0.
-        arms: the arm on whose hand the part is; None where it is in the world.
-        poses: (4, 4) of the part relative to that hand; in the world where no arm holds it.
+        arms: the arm that holds the part; None where it is in the world.
+        poses: (4, 4) of the part relative to its tool; in the world where no arm holds it.
     """
 
     times: tuple[float, ...]
@@ -31,7 +31,7 @@ class PartTrack:
     poses: tuple[Array, ...]
 
     def at(self, time: float) -> tuple[str | None, Array]:
-        """Return the arm that holds the part at a time [s], or None, and its pose on that hand or in the world."""
+        """Return the arm that holds the part at a time [s], or None, and its pose on its tool or in the world."""
         index = max(int(np.searchsorted(self.times, time, side="right")) - 1, 0)
         return self.arms[index], self.poses[index]
 
@@ -41,7 +41,7 @@ class PartPoses:
 
     Fingers that close hold the part whose grasp pose is nearest to the tool, if it is no farther away than half the
     opening of the gripper and its approach direction differs by no more than 45 degrees from that of the tool. The part
-    then moves with the hand, and stays where it is when they open.
+    then moves with the tool, and stays where it is when they open.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -86,7 +86,7 @@ class PartPoses:
         return self._tracks[part].arms[-1]
 
     def pose(self, part: str) -> Array:
-        """Return the pose (4, 4) of a part on the hand that holds it; in the world where none does."""
+        """Return the pose (4, 4) of a part on the tool that holds it; in the world where none does."""
         return self._tracks[part].poses[-1]
 
     def in_world(self, part: str, hands: Mapping[str, Array]) -> Array:
@@ -94,7 +94,7 @@ class PartPoses:
 
         Args:
             part: its name.
-            hands: (4, 4) pose of each hand in the world.
+            hands: (4, 4) pose of each tool in the world.
         """
         arm = self.carrier(part)
         return self.pose(part) if arm is None else hands[arm] @ self.pose(part)
@@ -113,7 +113,7 @@ class PartPoses:
         Args:
             arm: its name.
             tool: (4, 4) pose of its tool in the world.
-            hands: (4, 4) pose of each hand in the world.
+            hands: (4, 4) pose of each tool in the world.
         """
         within, nearest = self._cell.arms[arm].gripper_or_usual.opening / 2, None
         for name, part in self._cell.parts.items():
@@ -128,7 +128,7 @@ class PartPoses:
 
         Args:
             arm: its name.
-            hands: (4, 4) pose of each hand in the world.
+            hands: (4, 4) pose of each tool in the world.
             now: the time [s].
             width: to which they close where nothing is between them [m]; 0 when left out.
         """
@@ -137,15 +137,15 @@ class PartPoses:
         if part is not None:
             X_HP = inverse(hands[arm]) @ self.in_world(part, hands)
             self._put(part, arm, X_HP, now)
-            self._openings[arm] = _width_across(self._cell.parts[part].shape, X_HP)
+            self._openings[arm] = width_across(self._cell.parts[part].shape, X_HP)
         return part
 
     def open(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> tuple[str, ...]:
-        """Let the fingers of an arm open; return the parts that it has let go, which stay where they are.
+        """Let the fingers of an arm open; return the parts that it has released, which stay where they are.
 
         Args:
             arm: its name.
-            hands: (4, 4) pose of each hand in the world.
+            hands: (4, 4) pose of each tool in the world.
             now: the time [s].
             width: to which they open [m]; as far as they can when left out.
         """
@@ -172,7 +172,10 @@ class PartPoses:
         )
 
 
-def _width_across(shape: Shape, X_HP: Array) -> float:
-    """Return how far apart the fingers are that hold a part: both are as far from the middle as its farther side."""
+def width_across(shape: Shape, X_HP: Array) -> float:
+    """Return how far apart the fingers are that hold a solid at a pose (4, 4) on the tool [m].
+
+    Both fingers are as far from the middle as its farther side.
+    """
     across = X_HP[:3, :3].T[:, 1]
     return 2 * max(float(X_HP[1, 3]) + support(shape, across), support(shape, -across) - float(X_HP[1, 3]))

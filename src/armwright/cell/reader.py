@@ -15,10 +15,11 @@ from armwright.arrays import Array
 from armwright.cell.assembly import is_assembly
 from armwright.cell.camera_reader import read_cameras, read_visions, refuse_hidden_markers
 from armwright.cell.control_reader import read_alarms, read_force_sensor, read_plant, read_sensors, read_servo
-from armwright.cell.entries import ARM_NAME, read_name, read_pose, refuse_too_many
-from armwright.cell.frames import WORLD, Node
+from armwright.cell.entries import ARM_NAME, read_name, read_pose, read_spread, refuse_too_many
+from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
+from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
@@ -87,17 +88,20 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
+    frames, spreads = _read_frames(top.table("frames"), arms)
+    standing = _standing(frames, arms)
     scene = top.table("scene")
-    fixtures, parts, markers = read_fixtures(scene), read_parts(top.table("parts")), read_markers(scene)
+    fixtures, markers = read_fixtures(scene, standing), read_markers(scene)
+    parts = read_parts(top.table("parts"), {*fixtures, *markers})
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
-    frames = _read_frames(top.table("frames"), arms)
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
         gravity=_read_gravity(top),
         frames=frames,
+        spreads=spreads,
         fixtures=fixtures,
         parts=parts,
         markers=markers,
@@ -120,7 +124,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         clearance=motion.number("clearance_mm", default=0.0, lower=CLEARANCE_MM[0], upper=CLEARANCE_MM[1]) * 1e-3,
         around=DETOURS[motion.choice("around", DETOURS, default="none")],
         plan=motion.flag("plan"),
-        trials=read_trials(top.table("trials"), parts, markers, frames),
+        trials=read_trials(top.table("trials"), parts, markers, frames, standing),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
@@ -252,9 +256,11 @@ def _read_start(table: Table, arm: Arm, base: Array) -> Array:
     return solution.best.q
 
 
-def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
+def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], dict[str, Spread]]:
+    """Read the frames, and how far from there those may be that have a spread."""
     refuse_too_many(table, "frames")
     frames: dict[str, Node] = {}
+    spreads: dict[str, Spread] = {}
     entries: dict[str, Table] = {}
     for key in table:
         name = read_name(table, key, frames)
@@ -262,6 +268,8 @@ def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
             entry = entries[name] = table.table(key)
             parent = read_name(entry, "on", (), entry.text("on", default=WORLD))
             frames[name] = Node(parent=parent, relation=read_pose(entry, "at"))
+            if (spread := read_spread(entry, "spread_mm", "spread_deg", "tilt_deg")) != Spread():
+                spreads[name] = spread
             entry.refuse_unknown_keys()
         else:
             frames[name] = Node(parent=WORLD, relation=read_pose(table, key))
@@ -279,7 +287,18 @@ def _read_frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
             raise entry.error("on", f"{name} is attached to itself{by}")
         if len(path) > max_depth:
             raise entry.error("on", f"{name} is too deep in the frame tree: {limit_message('hanging')}")
-    return frames
+        if name in spreads and (arm := frames[path[-1]].parent) in arms:
+            raise entry.error(None, f"{name} moves with {arm}; only a frame that stands can have a spread")
+    return frames, spreads
+
+
+def _standing(frames: Mapping[str, Node], arms: Iterable[str]) -> FrameTree:
+    """Return the frames that do not move with an arm."""
+    moving, depth = set(arms), limit("hanging")
+    standing = {
+        name: it for name, it in frames.items() if frames[_path_to_root(name, frames, depth)[-1]].parent not in moving
+    }
+    return FrameTree({"STATION": Node(parent=WORLD, relation=np.eye(4)), **standing})
 
 
 def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list[str]:

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.frames import WORLD
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import one_pose
 from armwright.spatial.shapes import Box, Shape
@@ -17,6 +18,8 @@ SightKind: TypeAlias = Literal["part", "marker"]
 
 # The name of the body of a table, and of the camera of a cell with one.
 TABLE, CAMERA = "TABLE", "CAMERA"
+# The time constant of contacts with what stands [s].
+USUAL_CONTACT_TIME = 0.02
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -28,12 +31,16 @@ class Fixture:
         shape: its solid.
         pose: (4, 4) of the solid in the world.
         friction: coefficient of Coulomb friction of its surface.
+        contact_time: time constant of contacts with it in a cell with physics; the shorter, the harder it is [s].
+        on: the frame of the cell with which it stands elsewhere in a world; WORLD where it stands where it is.
     """
 
     name: str
     shape: Shape
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     friction: float = 0.8
+    contact_time: float = USUAL_CONTACT_TIME
+    on: str = WORLD
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -51,17 +58,19 @@ class Marker:
     pose: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(kw_only=True)
 class Spread:
-    """How the pose of a part at the start is drawn, evenly.
+    """How the pose of a part at the start, or of a frame, is drawn, evenly.
 
     Attributes:
         position: to either side along x and along y of the world [m].
         yaw: to either side about z of the world [rad].
+        tilt: to either side about a horizontal axis of any direction [rad].
     """
 
     position: float = 0.0
     yaw: float = 0.0
+    tilt: float = 0.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -132,12 +141,12 @@ class Camera:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Sight:
-    """What a camera looks for when a program asks for a frame.
+    """What a camera searches for when a program reads a frame.
 
     Attributes:
         kind: whether the frame is on a part or at a marker of the scene.
         name: of the part or of the marker.
-        camera: that looks; None where the cell has no camera that takes pictures.
+        camera: that takes the picture; None where the cell has no camera that takes pictures.
         height: at which the part stands or the marker lies [m]; None where nothing is known of that.
         relation: (4, 4) pose of the frame on the part or at the marker.
     """

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
-from armwright.cell.entries import read_name, read_pose, refuse_too_many
-from armwright.cell.scene import TABLE, Fixture, Gripper, Marker, Part, Spread, table
+from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, read_spread, refuse_too_many
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.scene import TABLE, USUAL_CONTACT_TIME, Fixture, Gripper, Marker, Part, table
 from armwright.errors import counted
 from armwright.files.document import Table
-from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, is_closed, open_edges
+from armwright.spatial.shapes import LARGEST_SIZE, Mesh, Shape, inertia, is_closed, open_edges
 
 # A coefficient of friction beyond this is that of glue.
 _MAX_FRICTION = 10.0
 _MAX_MASS = 1e5
 _MAX_FORCE = 1e5
+# Smaller moments of inertia are nothing that a simulation can divide by; trials may take off nine tenths [kg m²].
+_MIN_MOMENT = 1e-14
 # Markers of the dictionary 4X4_50.
 _MARKERS = 50
 _MAX_SYMMETRY = 360
@@ -22,11 +27,15 @@ _SHAPES = ("box", "cylinder", "mesh", "sphere")
 _FIXTURES = {"boxes": "box", "cylinders": "cylinder", "meshes": "mesh", "spheres": "sphere"}
 
 
-def read_fixtures(scene: Table) -> dict[str, Fixture]:
+def read_fixtures(scene: Table, frames: FrameTree) -> dict[str, Fixture]:
     """Read the bodies that stand where they are, by name.
 
+    Args:
+        scene: an empty table where the file has none.
+        frames: those that bodies can be on.
+
     Raises:
-        FileFormatError: a key is unknown, missing or out of range, or a name occurs twice.
+        FileFormatError: a key is unknown, missing or out of range, a name occurs twice, or a frame does not exist.
     """
     fixtures: dict[str, Fixture] = {}
     if "table" in scene:
@@ -34,12 +43,16 @@ def read_fixtures(scene: Table) -> dict[str, Fixture]:
     scene.allow("table")
     for kind, shape in _FIXTURES.items():
         for entry in scene.tables(kind) if kind in scene else ():
-            name = read_name(entry, "name", fixtures, entry.text("name"))
+            entry.add_amount("fixtures", 1, "name")
+            name = _body_name(entry, fixtures)
+            on = known_name(entry, "on", entry.text("on", default=WORLD), [*frames], "a standing frame")
             fixtures[name] = Fixture(
                 name=name,
                 shape=shape_in(entry, shape),
-                pose=read_pose(entry, "at"),
+                pose=frames.world(on) @ read_pose(entry, "at"),
                 friction=_friction(entry),
+                contact_time=entry.number("contact_ms", default=USUAL_CONTACT_TIME * 1e3, lower=2.0, upper=1e3) * 1e-3,
+                on=on,
             )
             entry.refuse_unknown_keys()
         scene.allow(kind)
@@ -57,11 +70,19 @@ def read_markers(scene: Table) -> dict[str, Marker]:
     markers: dict[str, Marker] = {}
     numbers: dict[int, str] = {}
     for entry in scene.tables("markers") if "markers" in scene else ():
-        name = read_name(entry, "name", markers, entry.text("name"))
+        name = _body_name(entry, markers)
         markers[name] = _marker(entry)
         if (other := numbers.setdefault(markers[name].number, name)) != name:
             raise entry.error("id", f"{other} and {name} have the same marker {markers[name].number}")
     return markers
+
+
+def _body_name(entry: Table, taken: Collection[str]) -> str:
+    """Read the name of a body or a marker of the scene, which is not that of an arm or of the world."""
+    name = read_name(entry, "name", taken, entry.text("name"))
+    if name == WORLD or ARM_NAME.fullmatch(name):
+        raise entry.error("name", f"{name} cannot name a body or a marker of the scene, as it names something else")
+    return name
 
 
 def _table(entry: Table) -> Fixture:
@@ -82,34 +103,38 @@ def _table(entry: Table) -> Fixture:
     return result
 
 
-def read_parts(parts: Table) -> dict[str, Part]:
+def read_parts(parts: Table, taken: Collection[str] = ()) -> dict[str, Part]:
     """Read the parts, by name.
+
+    Args:
+        parts: the table of them.
+        taken: names of bodies and markers of the scene, which no part has.
 
     Raises:
         FileFormatError: a key is unknown, missing or out of range, or two markers have one number.
     """
     result: dict[str, Part] = {}
     numbers: dict[int, str] = {}
-    refuse_too_many(parts, "entries")
+    refuse_too_many(parts, "parts")
     for key in parts:
         entry = parts.table(key)
         name = read_name(parts, key, result)
+        if name in taken:
+            raise parts.error(key, f"{name} is the name of a body or a marker of the scene too; rename one of them")
         marker = _marker(entry.table("marker")) if "marker" in entry else None
         if marker is not None and (other := numbers.setdefault(marker.number, name)) != name:
             raise entry.table("marker").error(
                 "id", f"the parts {other} and {name} have the same marker {marker.number}"
             )
         entry.allow("marker")
+        shape = _part_shape(entry)
         result[name] = Part(
             name=name,
-            shape=_part_shape(entry),
-            mass=entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS),
+            shape=shape,
+            mass=_part_mass(entry, shape),
             friction=_friction(entry),
             pose=read_pose(entry, "at"),
-            spread=Spread(
-                position=entry.number("spread_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
-                yaw=np.radians(entry.number("spread_deg", default=0.0, lower=0.0, upper=180.0)),
-            ),
+            spread=read_spread(entry, "spread_mm", "spread_deg"),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,
             symmetry=entry.whole("symmetry", 1, _MAX_SYMMETRY, default=1),
@@ -129,6 +154,16 @@ def _part_shape(entry: Table) -> Shape:
             "the mass of the part",
         )
     return shape
+
+
+def _part_mass(entry: Table, shape: Shape) -> float:
+    """Read the mass of a part, with which it has moments of inertia about all axes."""
+    mass = entry.number("mass_kg", lower=1e-6, upper=_MAX_MASS)
+    moment = mass * float(np.linalg.eigvalsh(inertia(shape))[0])
+    if not moment >= _MIN_MOMENT:
+        message = f"about an axis its moment of inertia is {moment:.3g} kg m²; expected {_MIN_MOMENT:g} or more"
+        raise entry.error("mass_kg", f"too small for such a shape; {message}")
+    return mass
 
 
 def _marker(entry: Table) -> Marker:

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.contact_course import ContactCourse, SceneContacts
 from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import Observations
@@ -68,23 +69,32 @@ class Simulator:
     """Simulated arms, fingers, devices, and a camera that gives the answers of the cell file in order.
 
     A contact plane of the cell yields to what an arm brings down on it, with a force proportional to the depth, as
-    long as the arm is in it.
+    long as the arm is in it. So does what stands in a cell without such a plane, in motions that a force may end.
     """
 
-    def __init__(self, cell: Cell) -> None:
-        """Set up the initial state of the cell."""
-        self._cell = cell
+    def __init__(self, cell: Cell, scene: SceneContacts | None = None) -> None:
+        """Set up the initial state of the cell.
+
+        Args:
+            cell: the cell.
+            scene: what stands in it, where a tool is to press on that.
+        """
+        self._cell, self._scene = cell, scene
+        self._courses: dict[str, ContactCourse] = {}
         self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
         self._active: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
         self._parts = PartPoses(cell)
+        # Wrenches that the sensors of forces take for zero.
+        self._zeros: dict[str, Array] = {}
 
     def copy(self) -> "Simulator":
         """Return a simulator in the same state; later commands to one do not change the other."""
-        other = Simulator(self._cell)
+        other = Simulator(self._cell, self._scene)
+        other._courses = dict(self._courses)
         other._motions, other._active = dict(self._motions), set(self._active)
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
-        other._parts = self._parts.copy()
+        other._parts, other._zeros = self._parts.copy(), dict(self._zeros)
         return other
 
     def advance(self, now: float) -> None:
@@ -106,7 +116,7 @@ class Simulator:
         now: float,
         tip: Array,
         *,
-        guarded: bool = False,  # noqa: ARG002 - the plane is the same for all
+        guarded: bool = False,
     ) -> None:
         """Let an arm follow a trajectory that begins at its configuration."""
         gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
@@ -115,9 +125,19 @@ class Simulator:
         pressed = [point.pose for point in points if self._depth(arm, point, now) > _DEPTH_TOLERANCE]
         points = self._contact_points(arm, trajectory, tip, pressed)
         self._motions[arm] = _Motion(t0=now, trajectory=trajectory, points=points)
+        self._press_on_scene(arm, now, trajectory, guarded=guarded)
+
+    def _press_on_scene(self, arm: str, now: float, trajectory: Trajectory, *, guarded: bool) -> None:
+        """See what a tool presses on from now on; without a guard only what it presses on already counts."""
+        course = self._courses.pop(arm, None)
+        pressed = frozenset() if course is None else course.at(now, self._cell.period).pairs
+        if self._scene is not None and (guarded or pressed):
+            self._courses[arm] = self._scene.along(arm, trajectory, now, self._parts, guarded=guarded, pressed=pressed)
 
     def contact_time(self, arm: str) -> float | None:
-        """Return when the latest motion of an arm comes down on the plane; None where it does not."""
+        """Return when the latest motion of an arm comes down on the plane or the scene; None where it does not."""
+        if arm in self._courses:
+            return self._courses[arm].first_contact
         motion = self._motions[arm]
         times = [
             self._find_contact_time(arm, motion.trajectory, point.pose, tick)
@@ -131,22 +151,46 @@ class Simulator:
 
         Where the motion starts deeper already, the depth at its start is the bound.
         """
-        motion = self._motions[arm]
+        motion, course = self._motions[arm], self._courses.get(arm)
+        if course is not None:
+            return None if course.excess_tick is None else course.t0 + course.excess_tick * self._cell.period
         depths = motion.depths()
         deep = depths > max(self._cell.contact.max_depth, depths[0]) + _DEPTH_TOLERANCE
         return motion.t0 + int(deep.argmax()) * self._cell.period if deep.any() else None
 
     def peak_contact(self, arm: str, now: float) -> PeakContact:
         """Return the deepest contact of an arm since its latest motion began, until now."""
+        if arm in self._courses:
+            deepest = self._courses[arm].deepest(now, self._cell.period)
+            return PeakContact(deepest.depth, deepest.depth * self._cell.contact.stiffness, deepest.body)
         motion = self._motions[arm]
         passed = round(motion.trajectory_time(now) / self._cell.period) + 1
         depth = float(motion.depths()[:passed].max())
         return PeakContact(depth, depth * self._cell.contact.stiffness)
 
-    def contact_force(self, arm: str, now: float) -> Array:
-        """Return the force (3,) of the plane on an arm and what it moves [N]: upwards, proportional to the depth."""
-        depth = max((self._depth(arm, point, now) for point in self._motions[arm].points), default=0.0)
-        return np.array([0.0, 0.0, depth * self._cell.contact.stiffness])
+    def contact_wrench(self, arm: str, now: float) -> Array:
+        """Return the wrench (6,) of the plane on an arm and what it moves, less that of ``zero_force``.
+
+        Force [N], upwards and proportional to the depth, and its moment about the tool point [N m].
+        """
+        return self._wrench(arm, now) - self._zeros.get(arm, 0.0)
+
+    def zero_force(self, arm: str, now: float) -> Array:
+        """Let the present wrench count as zero from now on; return it (6,)."""
+        self._zeros[arm] = self._wrench(arm, now)
+        return self._zeros[arm]
+
+    def _wrench(self, arm: str, now: float) -> Array:
+        if arm in self._courses:
+            return self._courses[arm].at(now, self._cell.period).wrench
+        points = self._motions[arm].points
+        depths = [self._depth(arm, point, now) for point in points]
+        if not any(depths):
+            return np.zeros(6)
+        deepest = int(np.argmax(depths))
+        force = np.array([0.0, 0.0, depths[deepest] * self._cell.contact.stiffness])
+        lever = self._hands(now)[arm][:3, :3] @ points[deepest].pose[:3, 3]
+        return np.concatenate([force, np.cross(lever, force)])
 
     def tool_wrenches(self, arm: str, now: float) -> Array:
         """Return the wrenches of the plane on the tool of an arm, (k, 6), at this servo tick and the following ones.
@@ -155,6 +199,8 @@ class Simulator:
         plane pushes on the deepest point.
         """
         motion, cell_arm, period = self._motions[arm], self._cell.arms[arm], self._cell.period
+        if arm in self._courses:
+            return self._scene_wrenches(arm, now)
         if not motion.depths().any():
             return np.zeros((1, 6))
         start = motion.trajectory_time(now)
@@ -167,6 +213,11 @@ class Simulator:
             up = cell_arm.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact.stiffness)[:, None]
             wrenches[ticks] = np.concatenate([up, np.cross(levers, up)], axis=1)
         return wrenches
+
+    def _scene_wrenches(self, arm: str, now: float) -> Array:
+        """Return the wrenches (k, 6) of the scene on a tool at this tick and the following ones, in the base."""
+        wrenches = self._courses[arm].wrenches(now, self._cell.period)
+        return (wrenches.reshape(-1, 3) @ self._cell.arms[arm].base[:3, :3]).reshape(-1, 6)
 
     def _depth(self, arm: str, point: _ContactPoint, now: float) -> float:
         """Return the depth of a point in the plane [m]."""
@@ -230,7 +281,7 @@ class Simulator:
         """Close or open the fingers of an arm; return the time it takes [s].
 
         The fingers of this simulator take the same time for every width, that of the file. A part that they close on
-        moves with the hand from now on, see ``PartPoses``; what they release stays where it is, and does not press on
+        moves with the tool from now on, see ``PartPoses``; what they release stays where it is, and does not press on
         the plane any more.
         """
         if self._cell.parts:
@@ -239,6 +290,9 @@ class Simulator:
             motion = self._motions[arm]
             is_gripper = [np.allclose(point.pose, np.eye(4), rtol=0, atol=_DEPTH_TOLERANCE) for point in motion.points]
             self._motions[arm] = attrs.evolve(motion, points=tuple(compress(motion.points, is_gripper)))
+            if arm in self._courses:
+                rest = motion.trajectory.after(motion.trajectory_time(now))
+                self._press_on_scene(arm, now, rest, guarded=self._courses[arm].guarded)
         return self._cell.arms[arm].grasp_time if closed else self._cell.arms[arm].open_time
 
     def operate(self, device: str, *, on: bool) -> float:

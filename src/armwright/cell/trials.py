@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TypeAlias
 
@@ -20,12 +21,12 @@ class Goal:
     Attributes:
         at: the frame or marker of the cell, z out of the surface, on whose origin the part stands upright.
         distance: how far from there it may be [m].
-        angle: how far it may be turned from there, or from an equal orientation of its symmetry [rad].
+        angle: how far it may be rotated from there, or from an equal orientation of its symmetry [rad].
     """
 
     at: str
     distance: float = 2e-3
-    angle: float = 0.05235987755982989
+    angle: float = math.radians(3.0)
 
 
 @attrs.frozen(kw_only=True)
@@ -50,7 +51,8 @@ class Trials:
     Attributes:
         friction: coefficient of every part; None for that of the cell.
         mass: by how much of its mass a part may be lighter or heavier, as a ratio.
-        poses: by name, how far parts and markers of the scene may be from their places, instead of their own spread.
+        poses: by name, how far parts, frames and markers of the scene may be from their places, instead of their own
+            spread.
         goals: by part.
         noise: of sensors.
     """

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 
-from armwright.cell.entries import read_name, refuse_too_many
+from armwright.cell.entries import known_name, read_name, read_spread, refuse_too_many
+from armwright.cell.frames import FrameTree
 from armwright.cell.scene import Spread
 from armwright.cell.trials import Goal, Interval, Noise, Trials
-from armwright.errors import closest
 from armwright.files.document import Table
 
 # Bounds of what is drawn; those of the keys whose values are replaced.
@@ -17,7 +17,13 @@ _MAX_FRICTION, _MAX_PIXELS, _MAX_FORCE, _MAX_PERCENT = 10.0, 255.0, 1e4, 100.0
 _MAX_MASS_PERCENT = 90.0
 
 
-def read_trials(table: Table, parts: Collection[str], markers: Collection[str], frames: Collection[str]) -> Trials:
+def read_trials(
+    table: Table,
+    parts: Collection[str],
+    markers: Collection[str],
+    frames: Collection[str],
+    standing: FrameTree,
+) -> Trials:
     """Read what trials draw and must reach.
 
     Args:
@@ -25,6 +31,7 @@ def read_trials(table: Table, parts: Collection[str], markers: Collection[str], 
         parts: names of the parts.
         markers: names of the markers of the scene.
         frames: names of the frames of the file.
+        standing: those of them that do not move with an arm.
 
     Raises:
         FileFormatError: a key is unknown or out of range, or a part, marker or frame does not exist.
@@ -32,7 +39,7 @@ def read_trials(table: Table, parts: Collection[str], markers: Collection[str], 
     trials = Trials(
         friction=_interval(table, "friction", _MAX_FRICTION),
         mass=table.number("mass_pct", default=0.0, lower=0.0, upper=_MAX_MASS_PERCENT) * 1e-2,
-        poses=_poses(table.table("pose"), [*parts, *markers]),
+        poses=_poses(table.table("pose"), parts, [*markers, *(name for name in frames if name in standing)]),
         goals=_goals(table.table("goal"), parts, [*markers, *frames]),
         noise=_noise(table.table("noise")),
     )
@@ -41,31 +48,27 @@ def read_trials(table: Table, parts: Collection[str], markers: Collection[str], 
     return trials
 
 
-def _poses(table: Table, known: Collection[str]) -> dict[str, Spread]:
+def _poses(table: Table, parts: Collection[str], others: Collection[str]) -> dict[str, Spread]:
     poses: dict[str, Spread] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, read_name(table, key, poses), known, "part or marker")
+        name = known_name(table, key, read_name(table, key, poses), [*parts, *others], "a part, frame or marker")
         entry = table.table(key)
-        poses[name] = Spread(
-            position=entry.number("xy_mm", default=0.0, lower=0.0, upper=1e6) * 1e-3,
-            yaw=math.radians(entry.number("yaw_deg", default=0.0, lower=0.0, upper=180.0)),
-        )
+        # A part stands upright; what it stands on may be tilted.
+        poses[name] = read_spread(entry, "xy_mm", "yaw_deg", None if name in parts else "tilt_deg")
         entry.refuse_unknown_keys()
     return poses
 
 
-def _goals(table: Table, parts: Collection[str], places: Collection[str]) -> dict[str, Goal]:
+def _goals(table: Table, parts: Collection[str], frames: Collection[str]) -> dict[str, Goal]:
     goals: dict[str, Goal] = {}
     refuse_too_many(table, "entries")
     for key in table:
-        name = _known_name(table, key, read_name(table, key, goals), parts, "part")
+        name = known_name(table, key, read_name(table, key, goals), parts, "a part")
         entry = table.table(key)
-        text, others = entry.text("at"), [other for other in parts if other != name]
+        others = [*frames, *(other for other in parts if other != name)]
         goals[name] = Goal(
-            at=_known_name(
-                entry, "at", read_name(entry, "at", (), text), [*places, *others], "marker, frame or other part"
-            ),
+            at=known_name(entry, "at", entry.text("at"), others, "a marker, frame or other part"),
             distance=entry.number("mm", default=2.0, lower=1e-3, upper=1e4) * 1e-3,
             angle=math.radians(entry.number("deg", default=3.0, lower=1e-3, upper=180.0)),
         )
@@ -94,13 +97,3 @@ def _interval(table: Table, key: str, upper: float, unit: float = 1.0) -> Interv
             key, f"expected two numbers from 0 to {upper:g}, the lower one first, got [{low:g}, {high:g}]"
         )
     return low * unit, high * unit
-
-
-def _known_name(table: Table, key: str, name: str, known: Collection[str], kind: str) -> str:
-    """Return a name that must be one of those of the cell."""
-    if name not in known:
-        near = closest(name, known)
-        names = ", ".join(sorted(known)) or "none"
-        hint = f"did you mean {near}?" if near else f"known: {names}"
-        raise table.error(key, f"{name} is no {kind} of the cell; {hint}")
-    return name

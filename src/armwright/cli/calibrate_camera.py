@@ -53,10 +53,10 @@ def calibrate_camera(  # noqa: PLR0917 - Typer reads one parameter per option
     units: Units = None,
     columns: ColumnMap = None,
     setup: Annotated[
-        str, Option(help="eye-in-hand: the camera is on the hand; eye-to-hand: it is fixed, and the board on the hand.")
+        str, Option(help="eye-in-hand: the camera is on the tool; eye-to-hand: it is fixed, and the board on the tool.")
     ] = "eye-in-hand",
-    arm_mm: Annotated[float, Option(help="Standard deviation of the position of the hand, per axis.")] = 0.1,
-    arm_mrad: Annotated[float, Option(help="Standard deviation of the orientation of the hand, per axis.")] = 0.5,
+    arm_mm: Annotated[float, Option(help="Standard deviation of the position of the tool, per axis.")] = 0.1,
+    arm_mrad: Annotated[float, Option(help="Standard deviation of the orientation of the tool, per axis.")] = 0.5,
     joint_sigmas: Annotated[
         str | None,
         Option(help="Instead: standard deviations of the joint positions in deg and mm, one, or one for each joint."),
@@ -71,7 +71,7 @@ def calibrate_camera(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Calibrate a camera from pictures of a board: its lens, and its pose on an arm or beside it.
 
-    The board is a chessboard or a ChArUco board. With --arm and --joints, the pose of the camera on the hand
+    The board is a chessboard or a ChArUco board. With --arm and --joints, the pose of the camera on the tool
     (eye-in-hand) or in the base frame of the arm (eye-to-hand) is estimated by least squares over the corners and the
     joint positions, each with its standard deviation. The command prints estimates with their standard errors and 95 %
     intervals. Pictures that contradict the others are left out and named. If the pictures are farther from the arm than
@@ -177,7 +177,7 @@ def _two(text: str, option: str) -> tuple[int, int]:
 
 
 def _accuracy(model: "Arm", arm_mm: float, arm_mrad: float, joints: str | None) -> "ArmAccuracy":
-    """Return the accuracy of an arm, of its hand or of its joints."""
+    """Return the accuracy of an arm, of its tool or of its joints."""
     from armwright.calibration.arm_readings import ArmAccuracy
 
     if joints is None:
@@ -193,13 +193,13 @@ def _pictures(paths: list[Path]) -> list[Path]:
     from armwright.errors import FileFormatError
     from armwright.files.pictures import ENDINGS
 
-    found = list[Path]()
+    files = list[Path]()
     for path in paths:
         if not path.is_dir():
-            found.append(path)
+            files.append(path)
             continue
-        inside = sorted(one for one in path.iterdir() if one.suffix.lower() in ENDINGS)
+        inside = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in ENDINGS)
         if not inside:
             raise FileFormatError(path, None, "", f"the folder has no pictures ({', '.join(ENDINGS)})")
-        found += inside
-    return found
+        files += inside
+    return files

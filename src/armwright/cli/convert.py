@@ -152,6 +152,14 @@ def _converted_arm(to: Format, reading: "tuple[Arm, list[str]]") -> Converted:
     return Converted(model.name, text, {"joints": model.n}, notes, lost)
 
 
+def _rest_of_cell(arm: "Arm") -> list[str]:
+    """Return a note on what an arm of a cell in MJCF leaves out: links of cells are named after their arm."""
+    owner, slash, link = arm.base_link.partition("/")
+    if not slash or link != "base" or not owner.startswith("ARM_"):
+        return []
+    return [f"the file is a cell, of which {owner} alone is read; armwright.physics.read_cell_mjcf reads all of it"]
+
+
 def _locked_positions(text: str | None, slides: Callable[[], Collection[str]]) -> "dict[str, float]":
     """Read the positions of locked joints, in degrees or millimetres, and return them in SI units.
 
@@ -196,7 +204,7 @@ def _read(
             raise usage_error("--package", f"expected a URDF file, whose meshes are in packages, got '{name}'")
         else:
             reading = read_mjcf(name, base=base, tip=tip, lock=locked)
-        return reading.arm, list(reading.notes)
+        return reading.arm, [*reading.notes, *_rest_of_cell(reading.arm)]
     for option, value in (("--base", base), ("--tip", tip), ("--lock", lock), ("--package", package)):
         if value:
             message = f"expected a URDF or MJCF file, whose links and joints have names, got '{name}'"

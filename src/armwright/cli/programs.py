@@ -43,10 +43,10 @@ def hardware_factory(*, physics: bool, seed: int) -> "HardwareFactory":
     """Return how cells are set up to run programs: with physics, or as their files state."""
     from functools import partial
 
-    from armwright.cell.simulator import Simulator
+    from armwright.physics.kinematic_cell import kinematic_cell
 
     if not physics:
-        return Simulator
+        return kinematic_cell
     from armwright.physics.world import PhysicsCell
 
     return partial(PhysicsCell, seed=seed)

@@ -24,7 +24,7 @@ def show(
     """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
 
     The tables are in degrees and millimetres; --json prints SI units and radians. With --collisions, print instead
-    what its links look like, which pairs of them are checked for collisions, and why others are not.
+    the solids of its links, which pairs of them are checked for collisions, and why others are not.
 
     **Example:** `armwright show puma560`
     """

@@ -50,7 +50,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     tool_wrench = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, (q, qd, qdd), table_file(csv, columns, skip_incomplete=skip_incomplete))
     blocks = ([values[first : first + _BLOCK] for values in motion] for first in range(0, len(motion[0]), _BLOCK))
-    causes = (_causes(terms(model, *block, load=body, wrench=tool_wrench)) for block in blocks)
+    causes = (_causes(model, terms(model, *block, load=body, wrench=tool_wrench)) for block in blocks)
     rows = (
         {name: values[row].tolist() for name, values in block.items()}
         for block in causes
@@ -80,8 +80,14 @@ def _motion(model: "Arm", values: tuple[str | None, str | None, str | None], fil
     return [joint_values(model, still if text is None else text, option)[None] for option, text in texts]
 
 
-def _causes(terms: "Terms") -> "dict[str, Array]":
+def _causes(model: "Arm", terms: "Terms") -> "dict[str, Array]":
     """Return the terms of each joint, (rows, n), as sums over the other joints."""
+    # Few arms have more than Coulomb friction.
+    others = {"dry friction" if model.motor_values("stribeck").any() else "Coulomb friction": terms.dry}
+    if model.motor_values("offset").any() or model.motor_values("cube_root").any():
+        others["other friction"] = terms.smooth
+    if any(joint.spring.stiffness for joint in model.joints):
+        others["springs"] = terms.spring
     return {
         "own inertia": terms.own,
         "coupling": terms.coupling.sum(axis=-1),
@@ -90,7 +96,7 @@ def _causes(terms: "Terms") -> "dict[str, Array]":
         "Coriolis": terms.coriolis.sum(axis=(-2, -1)),
         "gravity": terms.gravity,
         "viscous friction": terms.viscous,
-        "Coulomb friction": terms.dry,
+        **others,
         "load": terms.load,
         "wrench": terms.outside,
         "total": terms.total,

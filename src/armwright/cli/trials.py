@@ -118,16 +118,12 @@ def run_trials(
 
     With a folder, every finished trial is stored in it, and the same command resumes trials that were interrupted.
     """
-    from hashlib import sha256
-
-    from armwright.arm.write import toml_text
     from armwright.program.vm.trials import ProgramTrials
     from armwright.report.run_files import input_hashes
     from armwright.report.trials_files import trials_files
     from armwright.report.trials_summary import TrialsSummary
 
-    arms = {name: sha256(toml_text(arm.plant or arm.arm).encode()).hexdigest() for name, arm in cell.arms.items()}
-    identity = {"options": inputs.options, "inputs": input_hashes(inputs), "arms": arms}
+    identity = {"options": inputs.options, "inputs": input_hashes(inputs)}
     task = ProgramTrials(code=code, cell=cell, seed=seed, limits=limits, identity=identity)
     with sweep_bar(f"{count} trials", quiet=not watched) as progress:
         trials = evaluate_trials(task, count, output, machines, progress)

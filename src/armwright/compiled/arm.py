@@ -334,7 +334,7 @@ class CompiledArm:
     def mass_and_bias(
         self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: tuple[Array, Array] | None = None
     ) -> tuple[Array, Array]:
-        """Return the mass matrix, and the efforts that velocities and gravity take: tau = M qdd + bias + friction.
+        """Return the mass matrix, and the efforts of velocities, gravity and springs: tau = M qdd + bias + friction.
 
         Args:
             q: (..., n) joint positions [rad] or [m].
@@ -352,7 +352,7 @@ class CompiledArm:
 
     @_kernel_method
     def bias(self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
-        """Return the efforts that velocities and gravity take, friction left out.
+        """Return the efforts that velocities, gravity and springs take, friction left out.
 
         Args:
             q: (..., n) joint positions [rad] or [m].
@@ -369,7 +369,7 @@ class CompiledArm:
 
     @_kernel_method
     def gravity_efforts(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
-        """Return the efforts that hold the arm against gravity.
+        """Return the efforts that hold the arm against gravity and the springs at its joints.
 
         Args:
             q: (..., n) joint positions [rad] or [m].
@@ -423,7 +423,7 @@ class CompiledArm:
 
     @_kernel_method
     def potential_energy(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
-        """Return the potential energy in the field of gravity; that of a mass at the base origin is 0.
+        """Return the potential energy of gravity and springs; that of a mass at the base origin is 0.
 
         Args:
             q: (..., n) joint positions [rad] or [m].
@@ -505,12 +505,12 @@ class CompiledArm:
             qd: (..., n) joint velocities [rad/s] or [m/s].
             qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
             threads: how many cores to use; all when None.
-            out: (..., n, 14 n) to fill.
+            out: (..., n, p) to fill.
 
         Returns:
-            Y: (..., n, 14 n): ten columns per link, for its mass, first moments and inertia tensor about the origin of
-            its frame; behind them four per joint, for rotor inertia, viscous friction, and dry friction in and against
-            the direction of q.
+            Y: (..., n, p): ten columns per link, for its mass, first moments and inertia tensor about the origin of its
+            frame; behind them four per joint, for rotor inertia, viscous friction, and dry friction in and against the
+            direction of q, and those of other friction and of springs where the arm has them.
 
         Raises:
             UnsupportedArmError: nothing is known of the mass of some link.

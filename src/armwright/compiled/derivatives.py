@@ -39,8 +39,8 @@ def derivative(
     The functions of an arm over abstract scalars, such as ``dynamics.newton_euler.newton_euler``, are equations as
     well. The sine of an angle beyond 1e15, which the equation has computed, is NaN.
 
-    Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs`` and ``sqrt`` at 0, and for
-    ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the branch that is chosen.
+    Where there is no derivative, it is 0 for a comparison, for rounding, for ``abs``, ``sqrt`` and
+    ``cbrt`` at 0, and for ``atan2`` of the point (0, 0); that of ``select`` is the derivative of the chosen branch.
 
     Args:
         equation: takes one list of scalars per input, a matrix row by row, and returns a scalar, or a list of m.

@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, broadcast_rows, exact_shape, joint_array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.identification import base_parameters
-from armwright.dynamics.regressors import OF_DRIVE, OF_LINK
+from armwright.dynamics.regressors import parameter_count
 from armwright.errors import InvalidValueError
 
 # Samples whose regressors exist at a time: 2 MB of them for six joints.
@@ -77,7 +77,7 @@ def normal_equations(
     named = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     rows = broadcast_rows(", ".join(named), *(joint_array(x, n, name) for name, x in named.items()))
     q_, qd_, qdd_, tau_ = (x.reshape(-1, n) for x in rows)
-    columns = len(base_parameters(fast.arm).columns) if base else (OF_LINK + OF_DRIVE) * n
+    columns = len(base_parameters(fast.arm).columns) if base else parameter_count(fast.arm)
     A, b = np.zeros((columns, columns)), np.zeros(columns)
     for first in range(0, len(q_), _BLOCK):
         block = slice(first, first + _BLOCK)

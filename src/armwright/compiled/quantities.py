@@ -18,8 +18,9 @@ from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.identification import base_parameters, effort_base_regressor
 from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import newton_euler
-from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
+from armwright.dynamics.regressors import effort_regressor, parameter_count
 from armwright.dynamics.shares import gravity_shares, speed_shares
+from armwright.dynamics.springs import less_springs, spring_energy, with_springs
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
 from armwright.kinematics.inverse_kinematics.branches import branches, merged
@@ -154,11 +155,12 @@ def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
 
 
 def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: Numbers) -> Rows:
-    return [with_drives(arm, newton_euler(arm, q, qd, qdd, *wrench), qd, qdd)]
+    return [with_drives(arm, with_springs(arm, newton_euler(arm, q, qd, qdd, *wrench), q), qd, qdd)]
 
 
 def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:
-    accelerations, pivots = articulated_body(arm, q, qd, less_friction(arm, qd, tau))
+    driving = less_springs(arm, less_friction(arm, qd, tau), q)
+    accelerations, pivots = articulated_body(arm, q, qd, driving)
     return _if_inertias_count([accelerations], pivots)
 
 
@@ -179,7 +181,7 @@ def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
 
 
 def _bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
-    return [newton_euler(arm, q, qd, [0.0] * arm.n)]
+    return [with_springs(arm, newton_euler(arm, q, qd, [0.0] * arm.n), q)]
 
 
 def _gravity_efforts(arm: Arm, q: Numbers) -> Rows:
@@ -195,7 +197,7 @@ def _kinetic_energy(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
 
 
 def _potential_energy(arm: Arm, q: Numbers) -> Rows:
-    return [[link_potential_energy(arm, q)]]
+    return [[link_potential_energy(arm, q) + spring_energy(arm, q)]]
 
 
 def _inverse_dynamics_derivatives(arm: Arm, q: Inputs, qd: Inputs, qdd: Inputs) -> Rows:
@@ -253,7 +255,7 @@ def _size(arm: Arm, letter: str | int) -> int:
         return letter
     if letter == "b":
         return len(base_parameters(arm).columns)
-    return {"n": arm.n, "f": arm.n + 2, "p": (OF_LINK + OF_DRIVE) * arm.n}[letter]
+    return parameter_count(arm) if letter == "p" else {"n": arm.n, "f": arm.n + 2}[letter]
 
 
 # The inputs that are positions of joints.

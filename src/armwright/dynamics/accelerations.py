@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot, articulated_body
 from armwright.dynamics.drives import less_friction
 from armwright.dynamics.newton_euler import newton_euler
+from armwright.dynamics.springs import less_springs
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
@@ -50,7 +52,7 @@ def forward_dynamics(
     """
     lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
     model = arm if drives else _without_drives(arm)
-    driving = less_friction(model, qd_, tau_)
+    driving = less_springs(model, less_friction(model, qd_, tau_), q_)
     if not lead:
         # A division by zero must raise no error here: the check of the pivots reports it.
         q_, qd_, driving = ([np.array(x) for x in scalars] for scalars in (q_, qd_, driving))
@@ -93,7 +95,8 @@ def toacc(
     model = arm if drives else _without_drives(arm)
     D = stack_matrix(unit_accelerations(model, q_), lead)
     bias = newton_euler(model, q_, qd_, [0.0] * arm.n, push)
-    net = stack([a - b for a, b in zip(less_friction(model, qd_, tau_), bias, strict=True)], lead)
+    driving = less_springs(model, less_friction(model, qd_, tau_), q_)
+    net = stack([a - b for a, b in zip(driving, bias, strict=True)], lead)
     check_pivots(model, eliminated(model, D))
     return np.asarray(np.linalg.solve(D, net[..., None])[..., 0], dtype=np.float64)
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from armwright.arm.model import Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.arguments import NO_WRENCH, Scalars
 from armwright.dynamics.joint_frames import JointStep, joint_body, joint_steps
 from armwright.dynamics.newton_euler import base_frame_acceleration, tool_wrench

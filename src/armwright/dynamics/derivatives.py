@@ -13,6 +13,7 @@ from armwright.dynamics.arguments import Scalars, batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot
 from armwright.dynamics.drives import less_friction, with_drives
 from armwright.dynamics.newton_euler import newton_euler
+from armwright.dynamics.springs import with_springs
 from armwright.tracing.derivatives import jacobian, replaced
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced
@@ -49,12 +50,13 @@ class AccelerationDerivatives(NamedTuple):
 
 
 def inverse_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> EffortDerivatives:
-    """Return the derivatives of the efforts of a motion, drives included.
+    """Return the derivatives of the efforts of a motion, drives and springs included.
 
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps, and
+            Stribeck friction at rest.
         qdd: (..., n) joint accelerations.
 
     Returns:
@@ -79,7 +81,8 @@ def forward_dynamics_derivatives(arm: Arm, q: ArrayLike, qd: ArrayLike, tau: Arr
     Args:
         arm: the arm, with n joints.
         q: (..., n) joint positions [rad] or [m].
-        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps.
+        qd: (..., n) joint velocities. Coulomb friction has the derivative 0, at rest too, where it jumps, and
+            Stribeck friction at rest.
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Returns:
@@ -145,7 +148,7 @@ def effort_partials(
         qd: n joint velocities, as well.
         qdd: n joint accelerations, as well.
     """
-    efforts = with_drives(arm, newton_euler(arm, q, qd, qdd), qd, qdd)
+    efforts = with_drives(arm, with_springs(arm, newton_euler(arm, q, qd, qdd), q), qd, qdd)
     n = arm.n
     rows = jacobian(efforts, [*q, *qd, *qdd])
     M = mirrored([row[2 * n :] for row in rows])
@@ -174,7 +177,7 @@ def acceleration_partials(
     qdd = graph.inputs(arm.n)
     dq, dqd, M = effort_partials(arm, q, qd, qdd)
     inverse, pivots = inverse_of_mass(arm, M)
-    bias = newton_euler(arm, q, qd, [0.0] * arm.n)
+    bias = with_springs(arm, newton_euler(arm, q, qd, [0.0] * arm.n), q)
     accelerations = apply(inverse, subtract(less_friction(arm, qd, tau), bias))
     by = {x.node: acceleration for x, acceleration in zip(qdd, accelerations, strict=True)}
     at_accelerations = [replaced(row, by, graph) for row in dq]

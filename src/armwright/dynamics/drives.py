@@ -1,4 +1,4 @@
-"""The drives of the joints: rotor inertia, viscous and Coulomb friction, over abstract scalars."""
+"""The drives of the joints: rotor inertia and the law of friction, over abstract scalars."""
 
 from __future__ import annotations
 
@@ -6,27 +6,74 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arm.model import Arm, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.dynamics.arguments import Scalars
-from armwright.tracing.scalar import Scalar, select
+from armwright.tracing.scalar import Scalar, cbrt, exp, select
 from armwright.tracing.scan import scan
 
+# Below this speed friction by the cube root of the speed is in proportion to the speed [rad/s, m/s].
+SLOW = 1e-4
 
-class _Drive(NamedTuple):
-    """The numbers of a motor.
+
+class FrictionLaw(NamedTuple):
+    """The friction of a joint by its numbers, or of n joints by arrays (n,), as ``Motor`` describes it.
+
+    Terms that few arms have are None where there are none: they leave nothing in the code of an arm.
 
     Attributes:
-        inertia: of the rotor.
         viscous: viscous friction by the velocity.
         forward: Coulomb friction while the joint moves in the direction of q, above 0.
         backward: that against it, below 0.
+        offset: constant effort.
+        stribeck: what is added to the magnitude of Coulomb friction at break-away.
+        stribeck_speed: speed at which 1/e of that is left; not 0.
+        cube_root: friction by the cube root of the velocity.
     """
 
-    inertia: float
-    viscous: float
-    forward: float
-    backward: float
+    viscous: Scalar
+    forward: Scalar
+    backward: Scalar
+    offset: Scalar | None
+    stribeck: Scalar | None
+    stribeck_speed: Scalar | None
+    cube_root: Scalar | None
+
+    def dry(self, velocity: Scalar, direction: Scalar) -> Scalar:
+        """Return Coulomb and Stribeck friction.
+
+        Args:
+            velocity: of the joint.
+            direction: in which the joint moves, or is about to; its sign counts, and there is none where it is 0.
+        """
+        return _dry(self.forward, self.backward, direction, self.fading(velocity))
+
+    def fading(self, velocity: Scalar) -> Scalar | None:
+        """Return the magnitude of Stribeck friction; None where there is none."""
+        if self.stribeck is None:
+            return None
+        part = velocity / self.stribeck_speed
+        return self.stribeck * exp(-(part * part))
+
+    def smooth(self, velocity: Scalar) -> Scalar:
+        """Return the offset and the friction by the cube root of the velocity, which have no jump; 0.0 of none."""
+        friction: Scalar = 0.0
+        if self.cube_root is not None:
+            friction = self.cube_root * unit_cube_root_friction(velocity)
+        return friction if self.offset is None else friction + self.offset
+
+    def beyond_viscous(self, velocity: Scalar, direction: Scalar) -> Scalar:
+        """Return all friction but the viscous one: see ``dry`` and ``smooth``."""
+        friction = self.dry(velocity, direction)
+        if self.offset is None and self.cube_root is None:
+            return friction
+        return friction + self.smooth(velocity)
+
+
+def unit_cube_root_friction(velocity: Scalar) -> Scalar:
+    """Return the cube root of a velocity; below ``SLOW`` it is in proportion, so that its slope is finite at rest."""
+    return select(abs(velocity) < SLOW, velocity * SLOW ** (-2 / 3), cbrt(velocity))
 
 
 def with_drives(arm: Arm, efforts: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
@@ -39,9 +86,37 @@ def less_friction(arm: Arm, qd: Scalars, tau: Scalars) -> list[Scalar]:
     return scan(_less_friction, (), _drives(arm), qd, tau)[1]
 
 
-def joint_coulomb_friction(motor: Motor, velocity: Scalar) -> Scalar:
-    """Return the Coulomb friction of a moving joint, 0 at rest."""
-    return _coulomb(motor.coulomb_forward, -motor.coulomb_backward, velocity)
+def joint_friction_law(motor: Motor) -> FrictionLaw:
+    """Return the friction of one joint."""
+    return FrictionLaw(
+        motor.viscous,
+        motor.coulomb_forward,
+        -motor.coulomb_backward,
+        motor.offset or None,
+        motor.stribeck or None,
+        motor.stribeck_speed if motor.stribeck else None,
+        motor.cube_root or None,
+    )
+
+
+def friction_law(arm: Arm) -> FrictionLaw:
+    """Return the friction of all joints of an arm, in arrays (n,)."""
+
+    def where_any(name: str) -> Array | None:
+        values = arm.motor_values(name)
+        return values if values.any() else None
+
+    stribeck = where_any("stribeck")
+    speeds = np.where(arm.motor_values("stribeck") > 0, arm.motor_values("stribeck_speed"), 1.0)
+    return FrictionLaw(
+        arm.motor_values("viscous"),
+        arm.motor_values("coulomb_forward"),
+        -arm.motor_values("coulomb_backward"),
+        where_any("offset"),
+        stribeck,
+        None if stribeck is None else speeds,
+        where_any("cube_root"),
+    )
 
 
 def coulomb_friction(arm: Arm, qd: Array) -> Array:
@@ -54,27 +129,33 @@ def coulomb_friction(arm: Arm, qd: Array) -> Array:
     Returns:
         (..., n) the efforts that overcome it [N m] or [N], positive in the direction of q.
     """
-    return np.asarray(_coulomb(arm.motor_values("coulomb_forward"), -arm.motor_values("coulomb_backward"), qd))
+    return np.asarray(friction_law(arm)._replace(stribeck=None).dry(qd, qd))
 
 
-def _drive(motor: Motor) -> _Drive:
-    return _Drive(motor.inertia, motor.viscous, motor.coulomb_forward, -motor.coulomb_backward)
+class _Drive(NamedTuple):
+    """The inertia of a rotor and the friction of its drive."""
+
+    inertia: float
+    friction: FrictionLaw
 
 
 def _drives(arm: Arm) -> list[_Drive]:
-    return [_drive(motor) for motor in arm.motors]
+    return [_Drive(motor.inertia, joint_friction_law(motor)) for motor in arm.motors]
 
 
 def _with_drive(
     _: tuple[()], drive: _Drive, effort: Scalar, velocity: Scalar, acceleration: Scalar
 ) -> tuple[tuple[()], Scalar]:
-    inertial, viscous = drive.inertia * acceleration, drive.viscous * velocity
-    return (), effort + (inertial + viscous + _coulomb(drive.forward, drive.backward, velocity))
+    inertial, viscous = drive.inertia * acceleration, drive.friction.viscous * velocity
+    return (), effort + (inertial + viscous + drive.friction.beyond_viscous(velocity, velocity))
 
 
 def _less_friction(_: tuple[()], drive: _Drive, velocity: Scalar, effort: Scalar) -> tuple[tuple[()], Scalar]:
-    return (), effort - drive.viscous * velocity - _coulomb(drive.forward, drive.backward, velocity)
+    friction = drive.friction
+    return (), effort - friction.viscous * velocity - friction.beyond_viscous(velocity, velocity)
 
 
-def _coulomb(forward: Scalar, backward: Scalar, velocity: Scalar) -> Scalar:
-    return select(velocity > 0, forward, select(velocity < 0, backward, 0.0))
+def _dry(forward: Scalar, backward: Scalar, direction: Scalar, fading: Scalar | None) -> Scalar:
+    if fading is not None:
+        forward, backward = forward + fading, backward - fading
+    return select(direction > 0, forward, select(direction < 0, backward, 0.0))

@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
+from armwright.dynamics.springs import spring_energy
 from armwright.kinematics.forward_kinematics import link_frames, link_transform
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.tracing.scalar import Scalar
@@ -94,7 +95,7 @@ def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True
 
 
 def potential_energy(arm: Arm, q: ArrayLike) -> Array:
-    """Return the potential energy in the field of gravity; that of a mass at the base origin is 0.
+    """Return the potential energy in the field of gravity and in springs; that of a mass at the base origin is 0.
 
     Args:
         arm: the arm, with n joints.
@@ -112,4 +113,5 @@ def potential_energy(arm: Arm, q: ArrayLike) -> Array:
         TR-83-008 eq. (10).
     """
     lead, (q_,), _ = batch(arm, q=q)
-    return np.array(np.broadcast_to(link_potential_energy(arm, q_), lead), dtype=np.float64)
+    energy = link_potential_energy(arm, q_) + spring_energy(arm, q_)
+    return np.array(np.broadcast_to(energy, lead), dtype=np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array, ArrayLike, read_only, reduce_by_fields
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.dynamics.drives import joint_coulomb_friction
+from armwright.dynamics.drives import joint_friction_law
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
     inertia_coefficients,
@@ -17,6 +17,7 @@ from armwright.dynamics.lagrange_euler import (
 )
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.payloads import payload
+from armwright.dynamics.springs import spring_efforts
 from armwright.errors import KindError, shown
 from armwright.kinematics.forward_kinematics import stack
 
@@ -37,7 +38,9 @@ class Terms:
         coriolis: (..., n, n, n) by the product of the speeds of two joints j < k, both orders together; 0 elsewhere.
         gravity: (..., n) weight of the links.
         viscous: (..., n) friction that grows with speed.
-        dry: (..., n) Coulomb friction of moving joints; 0 at rest, where it depends on the other efforts.
+        dry: (..., n) Coulomb and Stribeck friction of moving joints; 0 at rest, where it depends on the other efforts.
+        smooth: (..., n) offset of the friction, and friction that grows with the cube root of speed.
+        spring: (..., n) springs at the joints.
         load: (..., n) by a load on the tool: its inertia, its speed and its weight.
         outside: (..., n) by a wrench on the tool.
 
@@ -53,6 +56,8 @@ class Terms:
     gravity: Array = attrs.field(converter=read_only)
     viscous: Array = attrs.field(converter=read_only)
     dry: Array = attrs.field(converter=read_only)
+    smooth: Array = attrs.field(converter=read_only)
+    spring: Array = attrs.field(converter=read_only)
     load: Array = attrs.field(converter=read_only)
     outside: Array = attrs.field(converter=read_only)
 
@@ -70,13 +75,14 @@ class Terms:
 
     @property
     def friction(self) -> Array:
-        """Friction of both kinds, (..., n)."""
-        return self.viscous + self.dry
+        """Friction of all kinds, (..., n)."""
+        return self.viscous + self.dry + self.smooth
 
     @property
     def total(self) -> Array:
         """All efforts, (..., n): F of the report's program, where it has the causes."""
-        return self.by_acceleration + self.by_speed + self.gravity + self.friction + self.load + self.outside
+        links = self.by_acceleration + self.by_speed + self.gravity
+        return links + self.friction + self.load + self.outside + self.spring
 
 
 def terms(
@@ -115,6 +121,7 @@ def terms(
     D = inertia_coefficients(derivatives)
     h = speed_coefficients(derivatives)
     motors = list(zip(arm.motors, qd_, qdd_, strict=True))
+    laws = [joint_friction_law(motor) for motor in arm.motors]
     pairs = [
         [[2.0 * h[i][j][k] * (qd_[j] * qd_[k]) if j < k else 0.0 for k in range(n)] for j in range(n)] for i in range(n)
     ]
@@ -126,7 +133,9 @@ def terms(
         coriolis=stack([x for plane in pairs for row in plane for x in row], lead).reshape(*lead, n, n, n),
         gravity=stack(gravity_coefficients(arm, derivatives), lead),
         viscous=stack([motor.viscous * speed for motor, speed, _ in motors], lead),
-        dry=stack([joint_coulomb_friction(motor, speed) for motor, speed, _ in motors], lead),
+        dry=stack([law.dry(speed, speed) for law, speed in zip(laws, qd_, strict=True)], lead),
+        smooth=stack([law.smooth(speed) for law, speed in zip(laws, qd_, strict=True)], lead),
+        spring=stack([0.0 if effort is None else effort for effort in spring_efforts(arm, q_)], lead),
         load=stack(newton_euler(payload(bare, load.mass, load.com, load.inertia), q_, qd_, qdd_), lead),
         outside=stack(newton_euler(bare, q_, still, still, push), lead),
     )

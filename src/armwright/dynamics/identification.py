@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import known_arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix, weighed
-from armwright.dynamics.regressors import OF_DRIVE, OF_LINK, effort_regressor
+from armwright.dynamics.regressors import OF_LINK, effort_regressor, joint_parameters, parameter_count
 from armwright.tracing.vectors import Matrix
 
 _OF_LINK = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-_OF_DRIVE = ("rotor", "viscous", "forward", "backward")
 # States at which the regressor is evaluated to find its structure; each gives an equation per joint.
 _STATES = 100
 # A column that is no longer than this part of the longest has no effect.
@@ -32,7 +32,7 @@ class BaseParameters(NamedTuple):
     Attributes:
         columns: (b,) which columns of ``regressor`` are independent: those of ``base_regressor``.
         names: of the parameter of each of these columns, such as ``Izz2`` of link 2; others are combined with it.
-        combinations: (b, 14 n) base parameters by the parameters of ``dynamic_parameters``: pi = combinations @ theta.
+        combinations: (b, p) base parameters by the p parameters of ``dynamic_parameters``: pi = combinations @ theta.
     """
 
     columns: tuple[int, ...]
@@ -40,16 +40,21 @@ class BaseParameters(NamedTuple):
     combinations: Array
 
 
-def parameter_names(joints: int) -> list[str]:
+def parameter_names(arm: Arm) -> list[str]:
     """Return the names of the parameters of ``dynamic_parameters``.
 
     Of link i they are ``mi``, ``mxi``, ``myi``, ``mzi``, ``Ixxi`` and so on, of the drive of joint i ``rotori``,
-    ``viscousi``, ``forwardi`` and ``backwardi``.
+    ``viscousi``, ``forwardi`` and ``backwardi``, and of one with friction of other kinds or a spring ``offseti``,
+    ``stribecki``, ``cube_rooti``, ``stiffnessi`` and ``preloadi``.
 
     Args:
-        joints: how many joints, and links, there are.
+        arm: the arm.
+
+    Raises:
+        KindError: it is no arm.
     """
-    return [f"{name}{i + 1}" for names in (_OF_LINK, _OF_DRIVE) for i in range(joints) for name in names]
+    groups = (_OF_LINK, joint_parameters(known_arm(arm)))
+    return [f"{name}{i + 1}" for names in groups for i in range(arm.n) for name in names]
 
 
 def base_parameters(arm: Arm) -> BaseParameters:
@@ -113,8 +118,11 @@ def _base_parameters(arm: Arm) -> BaseParameters:
     n = arm.n
     rng = np.random.default_rng(0)
     q, qd, qdd = rng.uniform(-3, 3, size=(3, n, _STATES))
+    # Stribeck friction shows at low speeds only.
+    low = arm.motor_values("stribeck_speed")
+    qd[low > 0, ::2] *= low[low > 0, None]
     Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_STATES,))
-    Y = Y.reshape(-1, (OF_LINK + OF_DRIVE) * n)
+    Y = Y.reshape(-1, parameter_count(arm))
     lengths = np.linalg.norm(Y, axis=0)
     has_effect = lengths > _NO_EFFECT * lengths.max()
     # The factor R has the same dependences between columns, in as many rows as columns.
@@ -125,7 +133,7 @@ def _base_parameters(arm: Arm) -> BaseParameters:
     coefficients[np.abs(coefficients) < _NO_COEFFICIENT] = 0.0
     coefficients[:, columns] = np.eye(len(columns))
     combinations = coefficients * lengths / lengths[columns][:, None]
-    names = parameter_names(n)
+    names = parameter_names(arm)
     return BaseParameters(tuple(columns), tuple(names[k] for k in columns), combinations)
 
 

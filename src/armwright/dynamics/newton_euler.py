@@ -10,6 +10,7 @@ from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
 from armwright.dynamics.drives import with_drives
 from armwright.dynamics.joint_frames import JointBody, JointStep, joint_body, joint_steps, lever_behind
+from armwright.dynamics.springs import with_springs
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.scan import scan
@@ -21,7 +22,7 @@ _STILL = (0.0, 0.0, 0.0)
 def newton_euler(
     arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars, wrench: Scalars = NO_WRENCH, *, base_acceleration: Scalars = _STILL
 ) -> list[Scalar]:
-    """Return the efforts that the links alone require, over abstract scalars, without rotor inertia and friction.
+    """Return the efforts that the links alone require, over abstract scalars, without drives and springs.
 
     Arguments and sources are those of ``joint_wrenches``. The effort at a joint is the component of the moment about
     its axis if it is revolute, of the force along its axis if it is prismatic.
@@ -228,7 +229,7 @@ def inverse_dynamics(
     base_acceleration: ArrayLike = _STILL,
     drives: bool = True,
 ) -> Array:
-    """Return the joint efforts of a motion.
+    """Return the joint efforts of a motion, those of springs at the joints included.
 
     Args:
         arm: the arm, with n joints.
@@ -254,7 +255,7 @@ def inverse_dynamics(
     """
     lead, (q_, qd_, qdd_), on_tool = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
     of_base = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
-    efforts = newton_euler(arm, q_, qd_, qdd_, on_tool, base_acceleration=of_base)
+    efforts = with_springs(arm, newton_euler(arm, q_, qd_, qdd_, on_tool, base_acceleration=of_base), q_)
     if drives:
         efforts = with_drives(arm, efforts, qd_, qdd_)
     return stack(efforts, lead)

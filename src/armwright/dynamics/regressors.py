@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
+from armwright.arm.drive import Motor, Spring
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix, weighed
 from armwright.dynamics.bodies import body_of
+from armwright.dynamics.drives import FrictionLaw, joint_friction_law, unit_cube_root_friction
 from armwright.dynamics.joint_frames import joint_steps, lever_behind
 from armwright.dynamics.newton_euler import JointMotion, joint_motions, point_accelerations
-from armwright.tracing.scalar import select
+from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, transpose
 
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # The six numbers of an inertia tensor, in their order.
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-# How many parameters a link has, and how many the drive of a joint.
-OF_LINK, OF_DRIVE = 10, 4
+# How many parameters a link has, and the parameters of every joint.
+OF_LINK = 10
+_OF_JOINT = ("rotor", "viscous", "forward", "backward")
 
 
 def regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -32,7 +37,7 @@ def regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         qdd: (..., n) joint accelerations.
 
     Returns:
-        Y: (..., n, 14 n), one column per parameter.
+        Y: (..., n, p), one column for each of the p parameters, 14 n for most arms.
 
     Raises:
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
@@ -56,13 +61,16 @@ def dynamic_parameters(arm: Arm) -> Array:
 
     with the mass m [kg], the centre of mass c in the frame of the link [m], and the inertia tensor I about the origin
     of that frame, not about c [kg m²]. Behind those of all links, for each joint: the rotor inertia, viscous friction,
-    and the magnitudes of Coulomb friction in and against the direction of q, as in ``Motor``.
+    and the magnitudes of Coulomb friction in and against the direction of q, as in ``Motor``. Where any joint of the
+    arm has them, each joint has its offset, its Stribeck friction (for its ``stribeck_speed``), its friction by the
+    cube root of the velocity, and of its spring the stiffness k and k times the position of rest as well, in this
+    order: see ``joint_parameters``.
 
     Args:
         arm: the arm, with n joints.
 
     Returns:
-        theta: (14 n,).
+        theta: (p,), 14 n parameters of an arm that has none of these.
 
     Raises:
         KindError: ``arm`` is no arm.
@@ -70,12 +78,47 @@ def dynamic_parameters(arm: Arm) -> Array:
     """
     bodies = [body_of(link) for link in weighed(arm).links]
     links = [[body.mass, *body.moment, *(body.tensor[a][b] for a, b in _PAIRS)] for body in bodies]
-    drives = [[m.inertia, m.viscous, m.coulomb_forward, m.coulomb_backward] for m in arm.motors]
+    names = joint_parameters(arm)
+    drives = [
+        [_of_joint(motor, joint.spring)[name] for name in names]
+        for motor, joint in zip(arm.motors, arm.joints, strict=True)
+    ]
     return np.array([x for part in (*links, *drives) for x in part], dtype=np.float64)
 
 
+def joint_parameters(arm: Arm) -> tuple[str, ...]:
+    """Return the names of the parameters of each joint, in their order: ``rotor``, ``viscous`` and so on."""
+    terms = {
+        "offset": any(motor.offset for motor in arm.motors),
+        "stribeck": any(motor.stribeck_speed for motor in arm.motors),
+        "cube_root": any(motor.cube_root for motor in arm.motors),
+        "stiffness": any(joint.spring.stiffness for joint in arm.joints),
+        "preload": any(joint.spring.stiffness for joint in arm.joints),
+    }
+    return (*_OF_JOINT, *(name for name, is_there in terms.items() if is_there))
+
+
+def parameter_count(arm: Arm) -> int:
+    """Return how many parameters ``dynamic_parameters`` has."""
+    return (OF_LINK + len(joint_parameters(arm))) * arm.n
+
+
+def _of_joint(motor: Motor, spring: Spring) -> dict[str, float]:
+    return {
+        "rotor": motor.inertia,
+        "viscous": motor.viscous,
+        "forward": motor.coulomb_forward,
+        "backward": motor.coulomb_backward,
+        "offset": motor.offset,
+        "stribeck": motor.stribeck,
+        "cube_root": motor.cube_root,
+        "stiffness": spring.stiffness,
+        "preload": spring.stiffness * spring.rest,
+    }
+
+
 def effort_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
-    """Return the regressor, n x 14 n, over abstract scalars.
+    """Return the regressor, n x p, over abstract scalars.
 
     The effort of a joint is the power of the wrenches on all links beyond it for a unit speed of the joint.
 
@@ -86,7 +129,8 @@ def effort_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
         qdd: n joint accelerations.
     """
     n = arm.n
-    Y: Matrix = [[0.0] * ((OF_LINK + OF_DRIVE) * n) for _ in range(n)]
+    names = joint_parameters(arm)
+    Y: Matrix = [[0.0] * parameter_count(arm) for _ in range(n)]
     steps = joint_steps(arm, q)
     # The velocities of a link, at the joint point, for unit velocities of the joints up to its own.
     unit: list[tuple[Vector, Vector]] = []
@@ -100,11 +144,31 @@ def effort_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
             turning, moving = apply(transpose(R), w), apply(transpose(R), add(v, cross(w, lever)))
             columns = [dot(moving, force) + dot(turning, moment) for force, moment in wrenches]
             Y[i][OF_LINK * k : OF_LINK * (k + 1)] = columns
-    for i, (speed, acceleration) in enumerate(zip(qd, qdd, strict=True)):
-        first = OF_LINK * n + OF_DRIVE * i
-        forward, backward = select(speed > 0, 1.0, 0.0), select(speed < 0, -1.0, 0.0)
-        Y[i][first : first + OF_DRIVE] = [acceleration, speed, forward, backward]
+    for i, (motor, *state) in enumerate(zip(arm.motors, q, qd, qdd, strict=True)):
+        first = OF_LINK * n + len(names) * i
+        Y[i][first : first + len(names)] = _joint_columns(motor, state, names)
     return Y
+
+
+def _joint_columns(motor: Motor, state: Scalars, names: Sequence[str]) -> list[Scalar]:
+    """Return the effort of a joint in a state q, qd, qdd, for a unit of each of its parameters."""
+    q, qd, qdd = state
+    forward, backward = select(qd > 0, 1.0, 0.0), select(qd < 0, -1.0, 0.0)
+    known: dict[str, Scalar] = {"rotor": qdd, "viscous": qd, "forward": forward, "backward": backward}
+    others: dict[str, Callable[[], Scalar]] = {
+        "offset": lambda: 1.0,
+        "stribeck": lambda: _unit_stribeck(motor).dry(qd, qd),
+        "cube_root": lambda: unit_cube_root_friction(qd),
+        "stiffness": lambda: q,
+        "preload": lambda: -1.0,
+    }
+    return [known[name] if name in known else others[name]() for name in names]
+
+
+def _unit_stribeck(motor: Motor) -> FrictionLaw:
+    """Return the law of a joint that has nothing but Stribeck friction, 1 at break-away; without a speed, nothing."""
+    speed = motor.stribeck_speed
+    return joint_friction_law(Motor(stribeck=1.0 if speed else 0.0, stribeck_speed=speed))
 
 
 def _unit_wrenches(motion: JointMotion, to_link: Matrix, lever: Vector) -> list[tuple[Vector, Vector]]:

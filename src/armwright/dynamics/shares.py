@@ -8,14 +8,15 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
 from armwright.dynamics.newton_euler import newton_euler
+from armwright.dynamics.springs import with_springs
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 
 
 def gravity_shares(arm: Arm, q: Sequence[Scalar]) -> list[Scalar]:
-    """Return the efforts that hold an arm at rest against gravity, over abstract scalars."""
+    """Return the efforts that hold an arm at rest against gravity and its springs, over abstract scalars."""
     still = [0.0] * arm.n
-    return newton_euler(arm, q, still, still)
+    return with_springs(arm, newton_euler(arm, q, still, still), q)
 
 
 def speed_shares(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Scalar]:
@@ -24,7 +25,7 @@ def speed_shares(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Sc
 
 
 def gravity_efforts(arm: Arm, q: ArrayLike) -> Array:
-    """Return the efforts that hold the arm against gravity.
+    """Return the efforts that hold the arm against gravity and the springs at its joints.
 
     Args:
         arm: the arm, with n joints.

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +33,8 @@ class Document:
     def __init__(self, path: Path, text: str, data: Mapping[str, Any], *, is_json: bool) -> None:
         """Keep a parsed text; ``read`` does the parsing."""
         self.path, self.text = path, text
+        # How much of what is limited for a whole file has been read so far, by the name of the limit.
+        self.amounts: Counter[str] = Counter()
         self._is_json = is_json
         self.root = Table(self, (), data)
 
@@ -275,6 +278,21 @@ class Table:
     def is_text(self, key: str) -> bool:
         """Whether the value of a key is a text."""
         return isinstance(self._data.get(key), str)
+
+    def add_amount(self, bound: str, amount: int, key: str) -> None:
+        """Add to how much of something all keys of the file have read together.
+
+        Args:
+            bound: name of its limit.
+            amount: that a key has read.
+            key: the key.
+
+        Raises:
+            FileFormatError: it is more than the limit.
+        """
+        self._document.amounts[bound] += amount
+        if (total := self._document.amounts[bound]) > limit(bound):
+            raise self.error(key, f"too many in this file: {limit_message(bound, total)}")
 
     def allow(self, *keys: str) -> None:
         """Make optional keys known: ``refuse_unknown_keys`` may name them as the nearest to a misspelt one."""

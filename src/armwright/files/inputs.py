@@ -62,6 +62,7 @@ def file_below(folder: Path, name: str) -> Path:
     """
     path = folder / name
     try:
+        path.exists()  # fails where a name is too long
         below = path.resolve().is_relative_to(folder.resolve())
     except (OSError, ValueError, RuntimeError):  # a name that no file can have, or links in a circle
         below = False

@@ -33,7 +33,6 @@ class Limit(NamedTuple):
 
 LIMITS: Mapping[str, Limit] = {
     "file_mb": Limit(4, "MB", "size of an arm, cell, linkage, URDF, MJCF, poses or estimate file"),
-    "meshes_mb": Limit(100, "MB", "size of the mesh files of an MJCF file together"),
     "program_mb": Limit(
         1, "MB", "size of a program in RLO, or of its intermediate code, also from standard input (`-`)"
     ),
@@ -60,12 +59,22 @@ LIMITS: Mapping[str, Limit] = {
     ),
     "hanging": Limit(1000, "frames", "depth of the frame tree of a cell, from a frame to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
+    "parts": Limit(1000, "parts", "parts of a cell"),
+    "fixtures": Limit(2000, "fixtures", "bodies of the scene of a cell"),
     "revolutions": Limit(1000, "revolutions", "limits of a revolute joint, as revolutions from zero"),
     "pictures": Limit(1000, "pictures", "pictures that a camera is calibrated with"),
     "picture_mb": Limit(50, "MB", "size of the file of a picture"),
     "picture_megapixels": Limit(100, "megapixels", "width times height of a picture, which its file names"),
-    "mesh_mb": Limit(100, "MB", "size of an STL, OBJ, glTF or STEP file, with all buffers that a glTF file names"),
+    "mesh_mb": Limit(
+        100,
+        "MB",
+        "size of an STL, OBJ, glTF or STEP file, with all buffers that a glTF file names; of all mesh files of an MJCF "
+        "file together",
+    ),
     "mesh_triangles": Limit(1_000_000, "triangles", "triangles of a mesh, its instances counted one by one"),
+    "file_triangles": Limit(
+        2_000_000, "triangles", "triangles of the meshes that an arm, cell or URDF file names, together"
+    ),
     "mesh_m": Limit(20, "m", "length of a mesh along any axis; a longer one is probably in another unit"),
     "gltf_values": Limit(1_000_000, "values", "values in the JSON of a glTF file"),
     "step_s": Limit(60, "s", "computing time for the triangles of a STEP file"),

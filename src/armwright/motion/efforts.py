@@ -2,9 +2,11 @@
 
 Run k times slower, a motion asks of every joint at every point for
 
-    tau(k) = gravity + dry friction + (viscous friction) / k + (inertia, centrifugal and Coriolis efforts) / k²
+    tau(k) = gravity + Coulomb friction + (viscous friction) / k + (inertia, centrifugal and Coriolis efforts) / k²
 
-so the least slowing follows from the roots of a parabola in 1/k, for each sample of the motion.
+so the least slowing follows from the roots of a parabola in 1/k, for each sample of the motion. Springs and the offset
+of friction count as gravity does. Stribeck friction and that by the cube root of the speed are taken as they are at the
+last k, and the least slowing is sought again.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.drives import coulomb_friction
+from armwright.dynamics.drives import FrictionLaw, coulomb_friction, friction_law
 from armwright.errors import IncapableArmError, KindError, ShapeError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -39,6 +41,9 @@ _ROUNDING = 1e-9
 # A motion that must run a million times slower stands still.
 _CRAWL = 1e-6
 _ROUNDS = 8
+# Where friction is no polynomial of the speed, the speed is lowered by this part at least, and so many halvings find
+# how much of that is not needed.
+_LEAST_LOWERING, _REFINED = 1e-3, 30
 
 
 class EffortPeaks(NamedTuple):
@@ -78,16 +83,32 @@ class _Samples(NamedTuple):
         return np.asarray(trajectory.times[self.segments] + self.parts * np.diff(trajectory.times)[self.segments])
 
 
+class _UnevenFriction(NamedTuple):
+    """Friction that is no polynomial of the speed: Stribeck's and that by the cube root, at samples with speeds."""
+
+    law: FrictionLaw
+    qd: Array
+
+    def at(self, u: float) -> Array:
+        """Return it (k, n) at the part u of the speeds."""
+        return np.asarray(uneven_friction(self.law, self.qd * u, self.qd))
+
+
 class _Shares(NamedTuple):
     """The efforts at k samples by how they change when the motion is slowed, (k, n) each."""
 
     lasting: Array
     viscous: Array
     dynamic: Array
+    uneven: _UnevenFriction | None = None
+
+    def lasting_at(self, u: float) -> Array:
+        """Return what does not change in proportion to a power of the speed, at the part u of it."""
+        return self.lasting if self.uneven is None else self.lasting + self.uneven.at(u)
 
     def at(self, u: float) -> Array:
         """Return the efforts (k, n) of the motion run at the part u of its speed."""
-        return self.lasting + u * (self.viscous + u * self.dynamic)
+        return self.lasting_at(u) + u * (self.viscous + u * self.dynamic)
 
 
 def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
@@ -179,8 +200,9 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
     if use.max() > most:
         k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
         unit = arm.joints[joint].units.effort
+        causes = "gravity, springs" if any(x.spring.stiffness for x in arm.joints) else "gravity"
         raise IncapableArmError(
-            f"{location(float(at[k]))} gravity and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
+            f"{location(float(at[k]))} {causes} and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
             f"of {arm.joint_label(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion "
             "is infeasible too"
         )
@@ -192,6 +214,17 @@ def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
     return np.asarray(solver.inverse_dynamics(q, still, still) + coulomb_friction(solver.arm, qd))
 
 
+def is_uneven(law: FrictionLaw) -> bool:
+    """Whether friction is more than a constant and a part in proportion to the speed."""
+    return law.stribeck is not None or law.cube_root is not None
+
+
+def uneven_friction(law: FrictionLaw, qd: Array, direction: Array) -> Array:
+    """Return Stribeck friction and that by the cube root of the speed (..., n), of joints that move in a direction."""
+    rest = law._replace(forward=np.zeros_like(law.forward), backward=np.zeros_like(law.backward), offset=None)
+    return np.asarray(rest.beyond_viscous(qd, direction))
+
+
 def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     """Return samples of all segments, at both ends of each among them, and where joints reverse.
 
@@ -200,7 +233,8 @@ def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     m, each = len(trajectory.coefficients), _each(trajectory)
     parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
     samples = _Samples(np.repeat(np.arange(m), each), np.tile(parts, m))
-    rubs = arm.motor_values("coulomb_forward") + arm.motor_values("coulomb_backward") > 0
+    dry = ("coulomb_forward", "coulomb_backward", "stribeck")
+    rubs = sum(arm.motor_values(name) for name in dry) > 0
     speeds = _states(trajectory, samples)[1].reshape(m, each, -1)
     segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
     low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
@@ -246,7 +280,10 @@ def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Share
     q, qd, qdd = _states(trajectory, samples)
     lasting = lasting_efforts(solver, q, qd)
     viscous = qd * solver.arm.motor_values("viscous")
-    return _Shares(lasting, viscous, solver.inverse_dynamics(q, qd, qdd) - lasting - viscous)
+    law = friction_law(solver.arm)
+    uneven = _UnevenFriction(law, qd) if is_uneven(law) else None
+    dynamic = solver.inverse_dynamics(q, qd, qdd) - lasting - viscous
+    return _Shares(lasting, viscous, dynamic if uneven is None else dynamic - uneven.at(1.0), uneven)
 
 
 def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array) -> tuple[Array, _Samples]:
@@ -276,21 +313,36 @@ def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array
 
 def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:
     """Return at which part of its speed, 1 at most, a motion keeps the limits, and which sample and joint decide."""
-    u, binding = 1.0, None
+    u, before, binding = 1.0, 1.0, None
+    lowering = _ROUNDING if shares.uneven is None else _LEAST_LOWERING
     while True:
         tau = shares.at(u)
         over = np.argwhere(np.abs(tau) > limits * (1 + _ROUNDING))
         if not len(over):
-            return u, binding
+            return (u if shares.uneven is None else _refined(shares, limits, u, before)), binding
         k, j = over.T
         side = np.sign(tau[k, j])
         # Of side (lasting + viscous u + dynamic u²) = limit the root below u, up from which the limit is passed.
-        a, b, c = side * shares.dynamic[k, j], side * shares.viscous[k, j], side * shares.lasting[k, j] - limits[j]
+        a, b, c = (
+            side * shares.dynamic[k, j],
+            side * shares.viscous[k, j],
+            side * shares.lasting_at(u)[k, j] - limits[j],
+        )
         root = np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))
         stable = b >= 0
         below = np.where(stable, -2 * c / np.where(stable, b + root, 1.0), (root - b) / np.where(stable, 1.0, 2 * a))
         worst = int(below.argmin())
-        u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
+        before, u = u, min(float(below[worst]), u * (1 - lowering))
+        binding = int(k[worst]), int(j[worst])
         if u < _CRAWL:
             message = f"would have to move {1 / u:.3g} times slower to keep its effort limit"
             raise IncapableArmError(f"{arm.joint_label(binding[1])} {message}")
+
+
+def _refined(shares: _Shares, limits: Array, u: float, beyond: float) -> float:
+    """Return a part of the speed that keeps the limits, as u does, next to one that does not."""
+    for _ in range(_REFINED):
+        middle = (u + beyond) / 2
+        keeps = (np.abs(shares.at(middle)) <= limits * (1 + _ROUNDING)).all()
+        u, beyond = (middle, beyond) if keeps else (u, middle)
+    return u

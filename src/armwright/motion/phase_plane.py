@@ -4,7 +4,9 @@ With x = s'² and u = s'', speeds, accelerations and efforts of the joints are
 
     qd² = q'² x,    qdd = q' u + q'' x,    tau = M q' u + (M q'' + h(q, q')) x + gravity + friction
 
-linear in u and x but for the viscous friction, which goes with the root of x. On every interval of the grid u is
+linear in u and x but for the viscous friction, which goes with the root of x, and for friction that is no polynomial of
+the speed: Stribeck's is taken as it is at the last solution, that by the cube root as a viscous one that is as large
+there. On every interval of the grid u is
 constant, so x at a later position of it is x + 2 u (s - s_i), linear too: the bounds hold at its start, its middle and
 its end.
 """
@@ -18,9 +20,9 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.dynamics.drives import coulomb_friction
+from armwright.dynamics.drives import coulomb_friction, friction_law
 from armwright.errors import IncapableArmError
-from armwright.motion.efforts import check_lasting
+from armwright.motion.efforts import check_lasting, is_uneven, uneven_friction
 from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
 from armwright.motion.solver import Solver
@@ -100,8 +102,10 @@ def fastest(
     x = solve(bounds, grid.lengths, rests)
     for k in np.flatnonzero(x[1:-1] > UNBOUNDED / 2):
         raise IncapableArmError(f"{locate(float(grid.origins[k + 1]))} no limit bounds the joint velocities")
-    before = 0.0
-    for _ in range(_ROUNDS if rows.viscous.any() else 0):
+    before, uneven = 0.0, is_uneven(friction_law(solver.arm))
+    for _ in range(_ROUNDS if uneven or rows.viscous.any() else 0):
+        if uneven:
+            rows = _rows(solver, grid, locate, efforts=efforts, x=x)
         bounds = rows.by_tangent(x, grid.lengths)
         x = solve(bounds, grid.lengths, rests)
         duration = float((2 * grid.lengths / (np.sqrt(x[1:]) + np.sqrt(x[:-1]))).sum())
@@ -135,9 +139,20 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
     return use
 
 
-def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts: bool) -> _Rows:
-    """Write down the bounds of all limits that there are."""
-    arm = solver.arm
+def _rows(
+    solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts: bool, x: Array | None = None
+) -> _Rows:
+    """Write down the bounds of all limits that there are.
+
+    Args:
+        solver: the arm.
+        grid: of the path.
+        locate: says where a parameter is on the path.
+        efforts: whether the efforts count.
+        x: a solution (N + 1,), at which friction that is no polynomial of the speed is taken; it is left out without.
+    """
+    arm, law = solver.arm, friction_law(solver.arm)
+    smooth, fading = law._replace(stribeck=None), law._replace(cube_root=None)
     speed, acceleration, effort = arm.limits.speed, arm.limits.acceleration, arm.limits.effort
     viscous = arm.motor_values("viscous")
     # The least and the most that dry friction takes of the joints on the intervals (N, n).
@@ -155,12 +170,26 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
             gravity = np.asarray(solver.inverse_dynamics(q, none, none))
             a = solver.inverse_dynamics(q, none, rate) - gravity
             b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - coulomb_friction(arm, rate)
+            resisting = viscous * rate
+            if is_uneven(law):
+                b = b - uneven_friction(law, rate, rate)
+            if is_uneven(law) and x is not None:
+                # At s' there.
+                there = _speeds(x, part)
+                gravity = gravity + uneven_friction(fading, rate * there, rate)
+                resisting = resisting + uneven_friction(smooth, rate * there, rate) / there
             lasting = gravity + np.where(gravity > 0, most, least)
             check_lasting(arm, lasting, _ALL, grid.origins, locate)
             # Where a joint reverses on an interval, its dry friction is either; so much less is left on both sides.
             margin = effort - (most - least) / 2
-            limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
+            limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, resisting, ahead)))
     return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*limits, strict=True)))
+
+
+def _speeds(x: Array, part: float) -> Array:
+    """Return s' (N, 1) at a part of every interval, at a solution; above 0."""
+    there = (1 - part) * x[:-1] + part * x[1:]
+    return np.asarray(np.sqrt(np.maximum(there, _FLOOR * x.max()))[:, None])
 
 
 def _limited(limits: Array, rows: _Rows) -> _Rows:

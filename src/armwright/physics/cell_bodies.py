@@ -1,14 +1,31 @@
-"""The bodies of an arm in a cell."""
+"""The bodies of a cell, and those of an arm."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from armwright.arm.guessed_solids import guessed_solids
 from armwright.arm.model import Arm
 from armwright.cell.scene import Gripper
-from armwright.physics.clearance import Body
 from armwright.physics.hand_solids import before_hand, gripper_length
 from armwright.spatial.poses import inverse
-from armwright.spatial.shapes import convex_solids
+from armwright.spatial.shapes import Solid, convex_solids
+
+
+class Body(NamedTuple):
+    """A solid of a cell.
+
+    Attributes:
+        name: in messages.
+        solid: in the frame of the link that carries it; in the world where none does.
+        arm: the arm that carries it; None where it stands.
+        link: of the arm, from 1; 0 is its base.
+    """
+
+    name: str
+    solid: Solid
+    arm: str | None = None
+    link: int = 0
 
 
 def has_solids(arm: Arm) -> bool:

@@ -1,4 +1,4 @@
-"""Whether the bodies of a cell meet on motions: decided along the whole way, not at samples.
+"""Whether the bodies of a cell meet on motions: decided along the whole path, not at samples.
 
 At a configuration where two solids are d apart they cannot meet before both together have moved by d. How far a solid
 can move follows from how far the joints before it move, and from its distances from their axes. An interval of time is
@@ -24,8 +24,9 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.trajectory import Trajectory
+from armwright.physics.cell_bodies import Body
 from armwright.physics.distances import TOLERANCE, Distances
-from armwright.spatial.shapes import Solid, farthest
+from armwright.spatial.shapes import farthest
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
@@ -39,22 +40,6 @@ _CLOSEST_FIRST = 64
 _PART_OF_DISTANCE, _PART_OF_OVERLAP = 0.1, 0.1
 # Farther apart no two bodies of a cell are [m].
 _FAR = 1e4
-
-
-class Body(NamedTuple):
-    """A solid of a cell.
-
-    Attributes:
-        name: in messages.
-        solid: in the frame of the link that carries it; in the world where none does.
-        arm: the arm that carries it; None where it stands.
-        link: of the arm, from 1; 0 is its base.
-    """
-
-    name: str
-    solid: Solid
-    arm: str | None = None
-    link: int = 0
 
 
 class LinkPoses(Protocol):
@@ -121,11 +106,11 @@ class Window(NamedTuple):
     pairs: Numbers
     margins: Array
 
-    def halves(self, places: Numbers) -> list[Window]:
-        """Return both halves of the interval, with the pairs at some places."""
+    def halves(self, indices: Numbers) -> list[Window]:
+        """Return both halves of the interval, with some of its pairs, by their indices."""
         middle = (self.start + self.end) / 2
         ends = (self.start, middle), (middle, self.end)
-        return [Window(start, end, self.pairs[places], self.margins[places]) for start, end in ends]
+        return [Window(start, end, self.pairs[indices], self.margins[indices]) for start, end in ends]
 
     def cut(self) -> list[Window]:
         """Return the intervals that this one is cut into at first."""
@@ -137,12 +122,12 @@ class _Near(NamedTuple):
     """The pairs of a window that are too near each other to be clear on all of it.
 
     Attributes:
-        places: (k,) where they are in the window.
+        indices: (k,) indices of the pairs of the window.
         distances: (k,) between them in the middle [m].
         moved: (k,) the most that their distances may change by until the start or the end [m].
     """
 
-    places: Numbers
+    indices: Numbers
     distances: Array
     moved: Array
 
@@ -209,20 +194,20 @@ class ClearanceChecker:
             end, count = max(motion.duration for motion in motions.values()), len(self._pairs)
             windows = [Window(0.0, end, np.arange(count), np.full(count, margin))]
         # What is left, the earliest last.
-        left = [piece for window in reversed(windows) for piece in reversed(window.cut())]
-        while left:
-            batch = [left.pop() for _ in range(min(_BATCH, len(left)))]
+        pending = [piece for window in reversed(windows) for piece in reversed(window.cut())]
+        while pending:
+            batch = [pending.pop() for _ in range(min(_BATCH, len(pending)))]
             halves: list[Window] = []
             for window, near in zip(batch, self._near(motions, batch, [it.margins for it in batch]), strict=True):
-                if not len(near.places):
+                if not len(near.indices):
                     continue
-                margins = window.margins[near.places]
-                met = np.flatnonzero(near.moved <= resolution(margins))
-                if len(met) and not halves:
-                    return self._closest(window, near, met[near.distances[met].argmin()])
+                margins = window.margins[near.indices]
+                touching = np.flatnonzero(near.moved <= resolution(margins))
+                if len(touching) and not halves:
+                    return self._closest(window, near, touching[near.distances[touching].argmin()])
                 # Something may be earlier than a contact: it is looked at again when that is decided.
-                halves += window.halves(near.places)
-            left += reversed(halves)
+                halves += window.halves(near.indices)
+            pending += reversed(halves)
         return None
 
     def least(
@@ -230,7 +215,7 @@ class ClearanceChecker:
         motions: Mapping[str, Trajectory],
         windows: Sequence[Window],
         within: float,
-        looks: int = 20_000,
+        evaluations: int = 20_000,
     ) -> Least:
         """Return the least distance between bodies while arms move, to 0.5 mm or a tenth of it.
 
@@ -238,48 +223,68 @@ class ClearanceChecker:
             motions: of all arms, from the same time on; an arm whose motion ends stands.
             windows: what is looked at; the margins of their pairs do not count.
             within: larger distances are not looked for [m].
-            looks: distances that are computed, a few more or less; where they do not suffice the bound is worse.
+            evaluations: distances that are computed, a few more or less; where they do not suffice the bound is worse.
         """
         best: Closest | None = None
         enough = within
         # What may be closer than the best that is known, with a lower bound of its distances.
-        left = [(-math.inf, piece) for window in windows for piece in window.cut()]
-        while left and looks > 0:
-            left.sort(key=lambda entry: entry[0])
-            batch, left = [window for _, window in left[:_CLOSEST_FIRST]], left[_CLOSEST_FIRST:]
+        pending = [(-math.inf, piece) for window in windows for piece in window.cut()]
+        while pending and evaluations > 0:
+            pending.sort(key=lambda entry: entry[0])
+            batch, pending = [window for _, window in pending[:_CLOSEST_FIRST]], pending[_CLOSEST_FIRST:]
             for window, near in zip(batch, self._near(motions, batch, [enough] * len(batch)), strict=True):
-                looks -= len(near.places)
-                if not len(near.places):
+                evaluations -= len(near.indices)
+                if not len(near.indices):
                     continue
                 if near.distances.min() < (within if best is None else best.distance):
                     best = self._closest(window, near, int(near.distances.argmin()))
                     enough = best.distance - max(RESOLUTION, _PART_OF_DISTANCE * best.distance)
                 bounds = near.distances - near.moved
-                wanted = np.flatnonzero(bounds < enough)
-                if len(wanted):
-                    bound = float(bounds[wanted].min())
-                    left += [(bound, half) for half in window.halves(near.places[wanted])]
-            left = [entry for entry in left if entry[0] < enough]
-        return Least(best, min([enough, *(bound for bound, _ in left)]))
+                close = np.flatnonzero(bounds < enough)
+                if len(close):
+                    bound = float(bounds[close].min())
+                    pending += [(bound, half) for half in window.halves(near.indices[close])]
+            pending = [entry for entry in pending if entry[0] < enough]
+        return Least(best, min([enough, *(bound for bound, _ in pending)]))
 
     def distances_at(self, motions: Mapping[str, Trajectory], times: Array, pairs: Numbers, within: float) -> Array:
         """Return the distances (t, k) of some pairs at times (t,) [m]; ``within`` where they are more."""
         windows = [Window(time, time, pairs, np.zeros(len(pairs))) for time in times.tolist()]
         result = np.full((len(times), len(pairs)), within)
         for row, near in zip(result, self._near(motions, windows, [within] * len(windows)), strict=True):
-            row[near.places] = near.distances
+            row[near.indices] = near.distances
         return result
+
+    def poses(self, motions: Mapping[str, Trajectory], times: Array) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies in the world at times (k,) [s]."""
+        return self.body_poses(self.link_frames({name: motions[name](times) for name in self.arms}))
+
+    def link_frames(self, configurations: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the frames (k, n + 2, 4, 4) of arms in the world, by name, at joint positions (k, n)."""
+        return {name: self.arms[name].base @ self.arms[name].arm.link_poses(q) for name, q in configurations.items()}
+
+    def body_poses(self, frames: Mapping[str, Array]) -> Array:
+        """Return the poses (k, b, 4, 4) of all bodies in the world, where the frames of all arms are there.
+
+        Args:
+            frames: (k, n + 2, 4, 4) of each arm, or (1, n + 2, 4, 4) of one that stands.
+        """
+        poses = np.empty((max(map(len, frames.values()), default=1), len(self._bodies), 4, 4))
+        for number, body in enumerate(self._bodies):
+            pose = body.solid.pose
+            poses[:, number] = pose if body.arm is None else frames[body.arm][:, body.link] @ pose
+        return poses
 
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:
         """Return the points (2, 3) of two bodies that are nearest to each other, or deepest in each other [m]."""
-        poses, _ = self._placed(motions, np.array([time]), np.array([time]))
+        poses = self.poses(motions, np.array([time]))
         for body in bodies:
-            self.distances.place(body, poses[0, body])
+            self.distances.set_pose(body, poses[0, body])
         return self.distances.nearest(*bodies, within=_FAR).points
 
-    def _closest(self, window: Window, near: _Near, place: int) -> Closest:
-        a, b = self._pairs[window.pairs[near.places[place]]].tolist()
-        return Closest(float(near.distances[place]), (a, b), (window.start + window.end) / 2)
+    def _closest(self, window: Window, near: _Near, index: int) -> Closest:
+        a, b = self._pairs[window.pairs[near.indices[index]]].tolist()
+        return Closest(float(near.distances[index]), (a, b), (window.start + window.end) / 2)
 
     def _near(
         self, motions: Mapping[str, Trajectory], batch: Sequence[Window], margins: Sequence[Array | float]
@@ -298,14 +303,12 @@ class ClearanceChecker:
             apart = np.linalg.norm(centres[i, a] - centres[i, b], axis=1) - self.radii[a] - self.radii[b]
             near = np.flatnonzero(apart < closer)
             for body in {*a[near].tolist(), *b[near].tolist()}:
-                self.distances.place(body, poses[i, body])
-            looked_at = zip(
-                a[near].tolist(), b[near].tolist(), np.maximum(closer[near], TOLERANCE).tolist(), strict=True
-            )
-            distances = np.array([self.distances.between(one, other, within) for one, other, within in looked_at])
+                self.distances.set_pose(body, poses[i, body])
+            queries = zip(a[near].tolist(), b[near].tolist(), np.maximum(closer[near], TOLERANCE).tolist(), strict=True)
+            distances = np.array([self.distances.between(first, second, within) for first, second, within in queries])
             kept = distances < closer[near]
-            places = near[kept]
-            results.append(_Near(places, distances[kept], change[places]))
+            indices = near[kept]
+            results.append(_Near(indices, distances[kept], change[indices]))
         return results
 
     def _placed(self, motions: Mapping[str, Trajectory], starts: Array, ends: Array) -> tuple[Array, Array]:
@@ -315,23 +318,18 @@ class ClearanceChecker:
         time of the interval, as seen from the base of its arm and from each of its links.
         """
         middles = (starts + ends) / 2
-        poses = np.empty((len(starts), len(self._bodies), 4, 4))
+        frames = self.link_frames({name: motions[name](middles) for name in self.arms})
+        poses = self.body_poses(frames)
         links = max((placed.arm.arm.n for placed in self.arms.values()), default=0)
         moved = np.zeros((len(starts), len(self._bodies), links + 1))
         for name, placed in self.arms.items():
-            motion = motions[name]
-            frames = placed.base @ placed.arm.link_poses(motion(middles))
-            changes = _largest_changes(motion, starts, ends)
+            changes = _largest_changes(motions[name], starts, ends)
             for number, body in enumerate(self._bodies):
                 if body.arm == name:
-                    poses[:, number] = frames[:, body.link] @ body.solid.pose
-                    carried = frames[:, : body.link + 1]
+                    carried = frames[name][:, : body.link + 1]
                     moved[:, number, : body.link + 1] = _movement(
                         placed.arm.arm, carried, poses[:, number], self.radii[number], changes
                     )
-        for number, body in enumerate(self._bodies):
-            if body.arm is None:
-                poses[:, number] = body.solid.pose
         return poses, moved
 
 

@@ -1,4 +1,4 @@
-"""What the bodies of an arm look like for collisions, and which pairs of them are checked: as tables and as data."""
+"""The solids of the bodies of an arm in collisions, and which pairs of them are checked: as tables and as data."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from itertools import groupby
 from typing import Any
 
 import attrs
+import numpy as np
 
 from armwright.arm.collision_pairs import Pair, body_names
 from armwright.arm.model import Arm
@@ -111,13 +112,9 @@ def _size_text(shape: Shape) -> str:
 
 def _solid_data(solid: Solid) -> dict[str, Any]:
     """Return a solid as plain data: its kind, its lengths [m], its pose and whether it is a guess."""
-    match solid.shape:
-        case Box(size=size):
-            lengths: dict[str, Any] = {"size": size.tolist()}
-        case Cylinder(radius=radius, length=length) | Capsule(radius=radius, length=length):
-            lengths = {"radius": radius, "length": length}
-        case Sphere(radius=radius):
-            lengths = {"radius": radius}
-        case Mesh(faces=faces, name=name):
-            lengths = {"triangles": len(faces), "file": name}
-    return {"kind": _kind(solid.shape), **lengths, "pose": solid.pose.tolist(), "guessed": solid.guessed}
+    shape = solid.shape
+    if isinstance(shape, Mesh):
+        lengths = {"triangles": len(shape.faces), "file": shape.name}
+    else:
+        lengths = {name: np.asarray(x).tolist() for name, x in attrs.asdict(shape, recurse=False).items()}
+    return {"kind": _kind(shape), **lengths, "pose": solid.pose.tolist(), "guessed": solid.guessed}

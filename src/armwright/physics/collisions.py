@@ -17,21 +17,22 @@ from armwright.cell.part_poses import PartPoses
 from armwright.compiled.arm import planning_arm
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.physics.cell_bodies import has_solids
-from armwright.physics.clearance import RESOLUTION, Body, ClearanceChecker, Closest, PlacedArm, Window
+from armwright.physics.cell_bodies import Body, has_solids
+from armwright.physics.clearance import RESOLUTION, ClearanceChecker, Closest, PlacedArm, Window
 from armwright.physics.configuration_checks import ConfigurationChecks
 from armwright.physics.joint_space import Margins
 from armwright.physics.placed_bodies import CellBodies, Role
+from armwright.physics.planned_move import PlannedMove
 from armwright.physics.planner import PlannedPath, plan_path
-from armwright.physics.wanted_contacts import PlannedMove, Surroundings, WantedContacts
+from armwright.physics.wanted_contacts import Surroundings, WantedContacts
 
 # Larger distances are not looked for [m].
 LOOKED_FOR = 0.05
 # Distances that are computed at most for the clearance of a stage, and for the depth of a collision.
-_LOOKS, _DEPTH_LOOKS = 4000, 1000
+_EVALUATIONS, _DEPTH_EVALUATIONS = 4000, 1000
 # Points on the path of the tool from which its length is summed.
 _PATH_POINTS = 201
-# Deeper overlaps than this are not told apart [m].
+# Deeper overlaps than this are not distinguished [m].
 _FAR = 1e3
 
 
@@ -44,14 +45,14 @@ class StageClearance:
         bound: it is no less than this anywhere [m].
         bodies: the names of both bodies, that of the arm first; empty where nothing comes near.
         time: when they are so near, since the stage began [s].
-        place: (3,) where, in the world [m].
+        point: (3,) where, in the world [m].
     """
 
     distance: float | None
     bound: float
     bodies: tuple[str, ...] = ()
     time: float = 0.0
-    place: tuple[float, ...] = ()
+    point: tuple[float, ...] = ()
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -63,12 +64,12 @@ class Collision:
         stage: on which stage, from 0; the last where it is hit after it has come to rest.
         fraction: how far along the path of that stage.
         time: when, since the MOVE began [s].
-        depth: how deep they overlap at most [m]; below 0 where they only come so near that it cannot be told.
-        place: (3,) where in the world [m].
+        depth: how deep they overlap at most [m]; below 0 where they only come so near that the depth is not known.
+        point: (3,) where in the world [m].
         at_start: whether they touch before the arm moves at all.
         at_rest: whether the arm has come to rest before.
         other_arm: the other arm, if the second body is on one; None otherwise.
-        guessed: whether it is a guess what one of them looks like.
+        guessed: whether the shape of one of them is a guess.
     """
 
     bodies: tuple[str, str]
@@ -76,7 +77,7 @@ class Collision:
     fraction: float
     time: float
     depth: float
-    place: Array = attrs.field(converter=read_only)
+    point: Array = attrs.field(converter=read_only)
     at_start: bool
     at_rest: bool
     other_arm: str | None
@@ -208,12 +209,12 @@ class CellCollisions:
             beside: by arm, the parts that its fingers may touch.
             clearances: whether they are asked for.
         """
-        wanted = self._wanted(move, others, parts, beside)
-        contact = wanted.first_contact()
+        contacts = self._contacts(move, others, parts, beside)
+        contact = contacts.first_contact()
         if contact is not None:
-            return MoveCheck(collision=self._collision(wanted, contact))
+            return MoveCheck(collision=self._collision(contacts, contact))
         stages = range(len(move.stages)) if clearances else ()
-        found = (_clearance(wanted, stage) for stage in stages)
+        found = (_clearance(contacts, stage) for stage in stages)
         return MoveCheck(collision=None, clearances=tuple(found))
 
     def path_past(
@@ -243,13 +244,13 @@ class CellCollisions:
             IncapableArmError: gravity alone takes more than a joint may give on the path.
             MissingExtraError: OMPL is not installed.
         """
-        wanted = self._wanted(move, others, parts, beside)
-        begin = wanted.starts[stage]
+        contacts = self._contacts(move, others, parts, beside)
+        begin = contacts.starts[stage]
         old = move.stages[stage]
 
         def certify(trajectory: Trajectory) -> Closest | None:
             stages = (*move.stages[:stage], trajectory, *move.stages[stage + 1 :])
-            tried = self._wanted(attrs.evolve(move, stages=stages), others, parts, beside)
+            tried = self._contacts(attrs.evolve(move, stages=stages), others, parts, beside)
             contact = tried.first_contact()
             # What comes before and after is looked at by ``check``.
             if contact is None or not begin <= contact.time <= begin + trajectory.duration:
@@ -257,7 +258,7 @@ class CellCollisions:
             return contact._replace(time=contact.time - begin)
 
         return plan_path(
-            wanted.surroundings.checker,
+            contacts.surroundings.checker,
             move.arm,
             old(0.0),
             goals,
@@ -265,10 +266,27 @@ class CellCollisions:
             certify=certify,
             speed=speed,
             period=self._cell.period,
-            margin=Margins(*(wanted.margins_at(begin + part * old.duration) for part in (0.0, 0.5, 1.0))),
+            margin=Margins(*(contacts.margins_at(begin + part * old.duration) for part in (0.0, 0.5, 1.0))),
         )
 
-    def _wanted(
+    def tool_pairs(self, arm: str, parts: PartPoses) -> tuple[ClearanceChecker, list[tuple[int, int]]]:
+        """Return the pairs of what stands and of the tool of an arm, or what it holds; and a checker of them.
+
+        Args:
+            arm: its name.
+            parts: where the parts are.
+        """
+        bodies, roles = self._bodies.arranged(parts), self._bodies.roles
+        tool = [
+            i
+            for i, (body, role) in enumerate(zip(bodies, roles, strict=True))
+            if body.arm == arm and (role.in_hand or role.part is not None)
+        ]
+        standing = [i for i, body in enumerate(bodies) if body.arm is None]
+        pairs = [(i, j) for i in tool for j in standing if (min(i, j), max(i, j)) not in self._left_out]
+        return self._checker.rearranged(bodies, pairs), pairs
+
+    def _contacts(
         self,
         move: PlannedMove,
         others: Mapping[str, Trajectory],
@@ -287,25 +305,25 @@ class CellCollisions:
         around = Surroundings(checker, motions, known, pairs, beside)
         return WantedContacts(move, around, self._cell.arms[move.arm].arm)
 
-    def _collision(self, wanted: WantedContacts, contact: Closest) -> Collision:
-        move, (checker, motions, bodies, pairs, _) = wanted.move, wanted.surroundings
+    def _collision(self, contacts: WantedContacts, contact: Closest) -> Collision:
+        move, (checker, motions, bodies, pairs, _) = contacts.move, contacts.surroundings
         number = pairs.index(contact.bodies)
         start = float(checker.distances_at(motions, np.zeros(1), np.array([number]), RESOLUTION)[0, 0])
         later = [
             Window(max(it.start, contact.time), it.end, np.array([number]), np.zeros(1))
-            for it in wanted.windows
+            for it in contacts.windows
             if it.end >= contact.time and number in it.pairs
         ]
-        deepest = checker.least(motions, later, _FAR, _DEPTH_LOOKS).closest
-        stage = wanted.stage_at(contact.time)
+        deepest = checker.least(motions, later, _FAR, _DEPTH_EVALUATIONS).closest
+        stage = contacts.stage_at(contact.time)
         return Collision(
             bodies=_named(move.arm, bodies, contact.bodies),
             stage=stage,
-            fraction=self._fraction(move, stage, contact.time - wanted.starts[stage]),
+            fraction=self._fraction(move, stage, contact.time - contacts.starts[stage]),
             time=contact.time,
             depth=-min(contact.distance, contact.distance if deepest is None else deepest.distance),
-            place=checker.nearest_points(motions, contact.time, contact.bodies).mean(axis=0),
-            at_start=start <= wanted.margin_at_start(number),
+            point=checker.nearest_points(motions, contact.time, contact.bodies).mean(axis=0),
+            at_start=start <= contacts.margin_at_start(number),
             at_rest=contact.time > move.trajectory.duration,
             other_arm=next(
                 (bodies[i][0].arm for i in contact.bodies if bodies[i][0].arm not in (None, move.arm)), None
@@ -328,10 +346,10 @@ class CellCollisions:
         return float(lengths[_PATH_POINTS - 1] / lengths[-1])
 
 
-def _clearance(wanted: WantedContacts, stage: int) -> StageClearance:
+def _clearance(contacts: WantedContacts, stage: int) -> StageClearance:
     """Return how near to other bodies an arm comes on a stage."""
-    checker, motions, bodies, _, _ = wanted.surroundings
-    least = checker.least(motions, wanted.clearance_windows(stage), LOOKED_FOR, _LOOKS)
+    checker, motions, bodies, _, _ = contacts.surroundings
+    least = checker.least(motions, contacts.clearance_windows(stage), LOOKED_FOR, _EVALUATIONS)
     closest = least.closest
     if closest is None:
         return StageClearance(distance=None, bound=least.bound)
@@ -339,16 +357,16 @@ def _clearance(wanted: WantedContacts, stage: int) -> StageClearance:
     return StageClearance(
         distance=closest.distance,
         bound=least.bound,
-        bodies=_named(wanted.move.arm, bodies, closest.bodies),
-        time=closest.time - wanted.starts[stage],
-        place=tuple(points.mean(axis=0).tolist()),
+        bodies=_named(contacts.move.arm, bodies, closest.bodies),
+        time=closest.time - contacts.starts[stage],
+        point=tuple(points.mean(axis=0).tolist()),
     )
 
 
 def _named(arm: str, bodies: Sequence[tuple[Body, Role]], pair: tuple[int, int]) -> tuple[str, str]:
     """Return the names of a pair of bodies, that of the moving arm first; its links without the name of the arm."""
-    one, other = pair if bodies[pair[0]][0].arm == arm else pair[::-1]
+    own, other = pair if bodies[pair[0]][0].arm == arm else pair[::-1]
     names = (
-        body.name.removeprefix(f"{arm} ") if body.arm == arm else body.name for body, _ in (bodies[one], bodies[other])
+        body.name.removeprefix(f"{arm} ") if body.arm == arm else body.name for body, _ in (bodies[own], bodies[other])
     )
     return next(names), next(names)

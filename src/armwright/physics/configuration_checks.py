@@ -64,7 +64,7 @@ class ConfigurationChecks:
             near = np.flatnonzero(nearest[i] < margins)
             moving = set(self._pairs[near].ravel().tolist()) - standing
             for body in moving:
-                self._checker.distances.place(body, poses[i, body])
+                self._checker.distances.set_pose(body, poses[i, body])
             standing |= {body for body in moving if self._checker.bodies[body].arm is None}
             for (a, b), margin in zip(self._pairs[near].tolist(), margins[near].tolist(), strict=True):
                 distance = self._checker.distances.between(a, b, max(margin, TOLERANCE))
@@ -90,7 +90,7 @@ class ConfigurationChecks:
                 break
             a, b = self._pairs[k].tolist()
             for body in {a, b} - placed:
-                self._checker.distances.place(body, poses[0, body])
+                self._checker.distances.set_pose(body, poses[0, body])
                 placed.add(body)
             distance = self._checker.distances.between(a, b, max(least, TOLERANCE))
             if distance < least:
@@ -105,7 +105,7 @@ class ConfigurationChecks:
         poses = self._poses_at(configurations)
         result = np.full(len(self._pairs), within)
         for body, pose in enumerate(poses[0]):
-            self._checker.distances.place(body, pose)
+            self._checker.distances.set_pose(body, pose)
         for k in np.flatnonzero(self._least_distances(poses)[0] < within).tolist():
             a, b = self._pairs[k].tolist()
             result[k] = self._checker.distances.between(a, b, within)
@@ -113,14 +113,8 @@ class ConfigurationChecks:
 
     def _poses_at(self, configurations: Mapping[str, Array]) -> Array:
         """Return the poses (k, b, 4, 4) of all bodies at configurations."""
-        frames = {}
-        for name, q in configurations.items():
-            frames[name] = self._checker.arms[name].base @ self._checker.arms[name].arm.link_poses(np.atleast_2d(q))
-        poses = np.empty((max(map(len, frames.values())), len(self._checker.bodies), 4, 4))
-        for number, body in enumerate(self._checker.bodies):
-            carrier = np.eye(4) if body.arm is None else frames[body.arm][:, body.link]
-            poses[:, number] = carrier @ body.solid.pose
-        return poses
+        rows = {name: np.atleast_2d(q) for name, q in configurations.items()}
+        return self._checker.body_poses(self._checker.link_frames(rows))
 
     def _least_distances(self, poses: Array) -> Array:
         """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
+from armwright.cell.hardware import PeakContact
 from armwright.physics.gripper import LIP_TOUCHES
 from armwright.physics.world_model import PIECE, PLATE, WorldModel
 
@@ -97,7 +98,7 @@ class Contacts:
         for part in held.values():
             self._carried[self._part_geoms[part]] = self._weights[self._part_geoms[part]]
         self._unwanted = apart & ~reach & ~reach.T
-        self._holders = owners
+        self._holders, self._harmless = owners, b""
 
     def unwanted(self, data: Any, least: float) -> Touch | None:
         """Return the hardest contact of an arm with what it should not touch, of at least a force [N].
@@ -107,8 +108,13 @@ class Contacts:
         if not data.ncon:
             return None
         geoms = data.contact.geom
+        # Mostly the same things touch as at the tick before.
+        touching = geoms.tobytes()
+        if touching == self._harmless:
+            return None
         suspicious = self._unwanted[geoms[:, 0], geoms[:, 1]]
-        if not suspicious.any():
+        if not np.count_nonzero(suspicious):
+            self._harmless = touching
             return None
         worst = None
         for number in np.flatnonzero(suspicious).tolist():
@@ -126,6 +132,27 @@ class Contacts:
         force = np.zeros(6)
         mujoco.mj_contactForce(self._model, data, number, force)
         return float(abs(force[0]))
+
+    def pressed(self, data: Any, arm: str) -> PeakContact:
+        """Return what an arm, and what it holds, presses on: the depth of the deepest contact, the sum of all forces.
+
+        Contacts are soft: their depth is that of the simulation.
+        """
+        if not data.ncon:
+            return PeakContact(0.0, 0.0)
+        import mujoco  # noqa: PLC0415 - only cells with several bodies need it
+
+        mine = self._holders[data.contact.geom] == arm
+        numbers = np.flatnonzero(mine[:, 0] != mine[:, 1]).tolist()
+        total, wrench, worst = np.zeros(3), np.zeros(6), (0.0, "")
+        for number in numbers:
+            mujoco.mj_contactForce(self._model, data, number, wrench)
+            force = wrench[:3] @ data.contact.frame[number].reshape(3, 3)
+            # The force of a contact is that on its second geom.
+            total += force if mine[number, 1] else -force
+            other = int(data.contact.geom[number, 0 if mine[number, 1] else 1])
+            worst = max(worst, (-float(data.contact.dist[number]), self.names[other]))
+        return PeakContact(worst[0], float(np.linalg.norm(total)), worst[1])
 
     def gripped(self, data: Any, arm: str) -> str | None:
         """Return the part that both pads of an arm touch, or most of the lip of its cup; None without one."""
@@ -157,17 +184,21 @@ class Contacts:
                 found.append(Overlap(self.names[a], self.names[b], depth))
         return found
 
-    def tool_force(self, data: Any, arm: str) -> Array:
-        """Return the force (3,) on the tool of an arm along the axes of the world, without the weight of the tool [N].
+    def tool_wrench(self, data: Any, arm: str) -> Array:
+        """Return the wrench (6,) on the tool of an arm along the axes of the world, without the weight of the tool.
 
-        As a sensor between the arm and its tool reads it.
+        Force [N] and moment about the tool point [N m], as a sensor between the arm and its tool reads them.
         """
         import mujoco  # noqa: PLC0415 - only cells with several bodies need it
 
         mujoco.mj_rnePostConstraint(self._model, data)
         tool = self._tools[arm]
+        moment, force = -data.cfrc_int[tool, :3], -data.cfrc_int[tool, 3:]
         weight = self._model.body_subtreemass[tool] * self._model.opt.gravity
-        return np.asarray(-data.cfrc_int[tool, 3:] - weight)
+        # MuJoCo gives moments about the centre of mass of all that hangs together.
+        centre = data.subtree_com[self._model.body_rootid[tool]] - data.xpos[tool]
+        lever = data.subtree_com[tool] - data.xpos[tool]
+        return np.concatenate([force - weight, moment + np.cross(centre, force) - np.cross(lever, weight)])
 
     def plate_depth(self, data: Any) -> float:
         """Return how deep the plane that yields is pressed [m]."""

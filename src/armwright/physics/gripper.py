@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.cell.scene import Gripper
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.geoms import add_geom
 from armwright.physics.hand_solids import gripper_solids
 from armwright.spatial.poses import homogeneous
@@ -27,15 +28,17 @@ _FINGER_MASS, _FINGER_INERTIA = 5e-3, 1e-6
 # What the drive of a finger moves, and its damping; gains with which it is positioned.
 _DRIVE_INERTIA, _DRIVE_DAMPING, _STIFFNESS, _SPEED_GAIN = 0.1, 20.0, 4000.0, 60.0
 # Damping of friction of held parts, by the step of the world.
-_FRICTION_DAMPING = 1.8
+_FRICTION_DAMPING = 1.9
 # So far inside what they hold fingers are sent [m]: the limit of their force decides.
 _INSIDE = 0.01
 # A soft constraint of one geom with what it touches: rolling and torsional friction are small.
 _ROLLING = (0.005, 1e-4)
 _STIFF = (0.95, 0.99, 0.001, 0.5, 2.0)
+# Contacts of pads with what they do not hold: time constant [s] and damping; from 0 to full stiffness within 3 mm.
+_TOUCH, _YIELDING = (5e-3, 1.0), (0.01, 0.9, 0.003, 0.5, 1.0)
 
 
-def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: float, **geoms: Any) -> None:
+def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, **geoms: Any) -> None:
     """Add a gripper to the tool of an arm: bodies ``NAME/left`` and ``NAME/right``, or geoms of a cup.
 
     Args:
@@ -43,16 +46,16 @@ def add_gripper(spec: Any, name: str, tool: Any, gripper: Gripper, timestep: flo
         name: of the arm.
         tool: its body.
         gripper: what it holds parts with.
-        timestep: of the world [s].
         geoms: options of all geoms.
     """
     pads = {
         "friction": (gripper.friction, *_ROLLING),
         "condim": 4,
-        # The stiffest that MuJoCo lets pass: held parts slip by less the stiffer the contact is while a carry turns.
-        "solref": (2 * timestep, 1.0),
-        "solimp": _STIFF,
-        "priority": 1,
+        # What they touch but do not hold yields like a spring, so that the force of a contact grows with its depth and
+        # is no blow: before what stands, which is stiffer, and behind the plane, which is a spring itself.
+        "solref": _TOUCH,
+        "solimp": _YIELDING,
+        "priority": 3,
     }
     if gripper.kind == "suction":
         _add_cup(spec, name, tool, gripper, geoms | pads)
@@ -109,8 +112,7 @@ def _add_cup(spec: Any, name: str, tool: Any, gripper: Gripper, options: dict[st
 
 def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) -> Any:
     """Add a finger to a tool, with its slide and its drive, and return its body."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     finger = tool.add_body(name=name, gravcomp=1.0)
     finger.explicitinertial, finger.mass, finger.inertia = True, _FINGER_MASS, (_FINGER_INERTIA,) * 3
     finger.ipos = np.zeros(3)
@@ -130,8 +132,7 @@ def _add_finger(spec: Any, tool: Any, name: str, sign: float, gripper: Gripper) 
 
 def _couple(spec: Any, name: str) -> None:
     """Let both fingers of an arm be equally far open: without that a part floats between two forces."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     coupling = spec.add_equality(
         name=f"{name}/fingers",
         type=mujoco.mjtEq.mjEQ_JOINT,
@@ -222,7 +223,8 @@ class GripperDrive:
 
     def opening(self, data: Any) -> float:
         """Return the distance between the fingers [m]; 0 for suction."""
-        return float(sum(data.qpos[position] for position in self._addresses))
+        qpos = data.qpos
+        return float(sum(qpos[position] for position in self._addresses))
 
     def copy(self) -> GripperDrive:
         """Return a drive in the same state."""

@@ -1,4 +1,4 @@
-"""What a gripper and the link before it look like, where only the opening of the gripper is known."""
+"""The shapes of a gripper and of the link before it, where only the opening of the gripper is known."""
 
 from __future__ import annotations
 
@@ -48,18 +48,18 @@ def gripper_solids(gripper: Gripper, opening: float) -> list[HandSolid]:
     if gripper.kind == "suction":
         (radius, length), (tube, beyond) = _CUP, _TUBE
         return [
-            HandSolid("suction cup", Cylinder(radius=radius, length=length), _at(0.0, -length / 2), grips=True),
+            HandSolid("suction cup", Cylinder(radius=radius, length=length), _offset(0.0, -length / 2), grips=True),
             HandSolid(
-                "suction tube", Cylinder(radius=tube, length=beyond), _at(0.0, -length - beyond / 2), grips=False
+                "suction tube", Cylinder(radius=tube, length=beyond), _offset(0.0, -length - beyond / 2), grips=False
             ),
         ]
     _, thickness, length = _FINGER
     aside = (opening + thickness) / 2
     palm = Box(size=(_PALM[0], gripper.opening + 2 * thickness, _PALM[1]))
     return [
-        HandSolid("finger", Box(size=_FINGER), _at(aside, -length / 2), grips=True),
-        HandSolid("finger", Box(size=_FINGER), _at(-aside, -length / 2), grips=True),
-        HandSolid("palm", palm, _at(0.0, -length - _PALM[1] / 2), grips=False),
+        HandSolid("finger", Box(size=_FINGER), _offset(aside, -length / 2), grips=True),
+        HandSolid("finger", Box(size=_FINGER), _offset(-aside, -length / 2), grips=True),
+        HandSolid("palm", palm, _offset(0.0, -length - _PALM[1] / 2), grips=False),
     ]
 
 
@@ -101,5 +101,5 @@ def before_hand(solid: Solid, arm: Arm, length: float) -> Solid | None:
     return Solid(shape=Capsule(radius=radius, length=(high - low) * 2 * half), pose=middle)
 
 
-def _at(o: float, a: float) -> Array:
+def _offset(o: float, a: float) -> Array:
     return homogeneous(np.eye(3), (0.0, o, a))

@@ -16,7 +16,7 @@ from armwright.spatial.shapes import farthest
 # Distances up to this are looked for [m].
 ROOM = 0.01
 # Levers are measured at so many configurations.
-_LOOKS = 64
+_SAMPLES = 64
 # A joint that moves no body counts as if it moved one by this part of what others do.
 _LEAST_LEVER = 0.02
 # Configurations nearer than this are the same [rad] or [m].
@@ -65,9 +65,9 @@ class JointSpace:
         # Pairs that the arm does not move do not count.
         moved = [body.arm == arm and body.link > 0 for body in checker.bodies]
         counting = np.array([moved[a] or moved[b] for a, b in checker.pairs], dtype=bool)
-        all_ = margin if isinstance(margin, Margins) else Margins(*[np.full(len(counting), margin)] * 3)
+        margins = margin if isinstance(margin, Margins) else Margins(*[np.full(len(counting), margin)] * 3)
         # What comes nearer than can be told counts as a contact on motions.
-        self._start, self._least, self._end = (np.where(counting, each + resolution(each), -np.inf) for each in all_)
+        self._start, self._least, self._end = (np.where(counting, each + resolution(each), -np.inf) for each in margins)
         self._margins = self._least
         self.arm = checker.arms[arm].arm.arm
         self._ends = np.zeros((0, self.arm.n))
@@ -122,7 +122,7 @@ def _levers(checker: ClearanceChecker, arm: str) -> Array:
     compiled = checker.arms[arm].arm
     limits, joints = compiled.arm.limits, compiled.arm.joints
     lower, upper = np.maximum(limits.lower, -np.pi), np.minimum(limits.upper, np.pi)
-    frames = compiled.link_poses(np.random.default_rng(0).uniform(lower, upper, (_LOOKS, len(joints))))
+    frames = compiled.link_poses(np.random.default_rng(0).uniform(lower, upper, (_SAMPLES, len(joints))))
     levers = np.zeros(len(joints))
     for body in checker.bodies:
         if body.arm == arm:

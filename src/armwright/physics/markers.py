@@ -8,10 +8,12 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.scene import Marker
-from armwright.extras import import_extra
-from armwright.physics.geoms import place
-from armwright.physics.graphics import load_mujoco
+from armwright.extras import opencv
+from armwright.mujoco_library import load_mujoco
+from armwright.physics.geoms import placement
 
+# What needs OpenCV, in messages.
+PURPOSE = "seeing markers"
 # The sides of the black square in cells of the pattern, and of the white margin around it.
 CELLS, _MARGIN = 6, 1
 # Pixels of a texture per cell.
@@ -28,17 +30,8 @@ def dictionary() -> Any:
     Raises:
         MissingExtraError: OpenCV is missing.
     """
-    cv2 = opencv()
+    cv2 = opencv(PURPOSE)
     return cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
-
-
-def opencv() -> Any:
-    """Return the module of OpenCV.
-
-    Raises:
-        MissingExtraError: it is missing.
-    """
-    return import_extra("cv2", "seeing markers", "physics", "opencv-python-headless")
 
 
 def marker_corners(size: float) -> Array:
@@ -73,7 +66,7 @@ def add_marker(spec: Any, body: Any, marker: Marker, name: str) -> None:
     cells = CELLS + 2 * _MARGIN
     pixels = np.full((cells * _PIXELS, cells * _PIXELS), 255, dtype=np.uint8)
     inner = slice(_MARGIN * _PIXELS, -_MARGIN * _PIXELS)
-    pixels[inner, inner] = opencv().aruco.generateImageMarker(dictionary(), marker.number, CELLS * _PIXELS)
+    pixels[inner, inner] = opencv(PURPOSE).aruco.generateImageMarker(dictionary(), marker.number, CELLS * _PIXELS)
     kinds = mujoco.mjtTexture
     texture = spec.add_texture(name=name, type=kinds.mjTEXTURE_2D, width=len(pixels), height=len(pixels), nchannel=3)
     texture.data = np.repeat(pixels[:, :, None], 3, axis=2).tobytes()
@@ -91,7 +84,7 @@ def add_marker(spec: Any, body: Any, marker: Marker, name: str) -> None:
         userface=np.array(front + back + rim, dtype=np.int32).ravel(),
         usertexcoord=np.array([(0, 0), (1, 0), (1, 1), (0, 1)] * 2, dtype=np.float64).ravel(),
     )
-    pose = place(marker.pose)
+    pose = placement(marker.pose)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,

@@ -27,7 +27,7 @@ class Log:
         """Begin with nothing."""
         self._cell, self._parts = cell, tuple(world.parts)
         self._full: dict[str, list[Array]] = {name: [] for name in cell.arms}
-        self._rows = {name: np.empty((_BLOCK, 4 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
+        self._rows = {name: np.empty((_BLOCK, 5 * arm.arm.n + 1)) for name, arm in cell.arms.items()}
         self._count = 0
         self._every = max(1, round(_PARTS / cell.period))
         self._tracks: dict[str, list[tuple[float, Array]]] = {
@@ -48,7 +48,7 @@ class Log:
         row = self._rows[arm][tick % _BLOCK]
         n = len(measured.q)
         row[:n], row[n : 2 * n], row[2 * n : 3 * n] = measured.q, measured.qd, measured.tau
-        row[3 * n : 4 * n], row[-1] = reference.q, opening
+        row[3 * n : 4 * n], row[4 * n : 5 * n], row[-1] = reference.q, measured.actual, opening
         if tick % _BLOCK == _BLOCK - 1:
             self._full[arm].append(self._rows[arm])
             self._rows[arm] = np.empty_like(self._rows[arm])
@@ -61,7 +61,11 @@ class Log:
         for name in self._parts:
             X = part_pose(data, name)
             if np.abs(X - self._tracks[name][-1][1]).max() > _STILL:
-                self._tracks[name].append((tick * self._cell.period, X))
+                track, before = self._tracks[name], (tick - self._every) * self._cell.period
+                if track[-1][0] < before:
+                    # It stood still until then.
+                    track.append((before, track[-1][1]))
+                track.append((tick * self._cell.period, X))
 
     def at(self, arm: str, tick: int) -> Measured:
         """Return what a servo did at a tick that has been recorded, or at the last one."""
@@ -69,8 +73,8 @@ class Log:
         block, row = divmod(tick, _BLOCK)
         full = self._full[arm]
         values = full[block][row] if block < len(full) else self._rows[arm][row]
-        n = (len(values) - 1) // 4
-        return Measured(values[:n], values[n : 2 * n], values[2 * n : 3 * n])
+        n = (len(values) - 1) // 5
+        return Measured(values[:n], values[n : 2 * n], values[2 * n : 3 * n], values[4 * n : 5 * n])
 
     def streams(self) -> tuple[MeasuredStream, ...]:
         """Return what was recorded, one stream per arm."""
@@ -78,7 +82,7 @@ class Log:
 
     def _stream(self, name: str) -> MeasuredStream:
         rows = np.concatenate([*self._full[name], self._rows[name]])[: self._count]
-        n = (rows.shape[1] - 1) // 4
+        n = (rows.shape[1] - 1) // 5
         return MeasuredStream(
             arm=name,
             t=np.arange(self._count, dtype=np.float64) * self._cell.period,
@@ -86,6 +90,7 @@ class Log:
             qd=rows[:, n : 2 * n],
             tau=rows[:, 2 * n : 3 * n],
             sent=rows[:, 3 * n : 4 * n],
+            actual=rows[:, 4 * n : 5 * n],
             opening=rows[:, -1],
         )
 

@@ -1,10 +1,12 @@
 """What goes wrong in a world between the statements of a program, in words.
 
-R603: fingers closed on nothing. R604: an arm presses on what it should not. R605: a part is lost from the hand.
-R606: an arm is not where it was sent. R607: the world has become unstable.
+R603: fingers closed on nothing. R604: an arm presses on what it should not. R605: a held part is lost.
+R606: an arm deviates from its motion. R607: the world has become unstable.
 """
 
 from __future__ import annotations
+
+import math
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
@@ -15,7 +17,7 @@ _LOOK_AGAIN = "look again before the MOVE to it: put both in a TRY, and RETRY af
 
 
 def closed_on_nothing(time: float, arm: str, part: str, distance: float) -> Mishap:
-    """Return what is said where fingers that close do not get hold of a part, which is a distance away [m]."""
+    """Return the mishap of fingers that close on nothing, while the part is a distance away [m]."""
     return Mishap(
         time=time,
         arm=arm,
@@ -27,7 +29,7 @@ def closed_on_nothing(time: float, arm: str, part: str, distance: float) -> Mish
 
 
 def touched(time: float, touch: Touch) -> Mishap:
-    """Return what is said where an arm presses on something."""
+    """Return the mishap of an arm that presses on something."""
     return Mishap(
         time=time,
         arm=touch.arm,
@@ -39,11 +41,11 @@ def touched(time: float, touch: Touch) -> Mishap:
 
 
 def lost(time: float, arm: str, part: str, holds: float, mass: float) -> Mishap:
-    """Return what is said where a part has left the hand.
+    """Return the mishap of a part that has left the gripper.
 
     Args:
         time: when [s].
-        arm: whose hand.
+        arm: that held it.
         part: its name.
         holds: the mass that the gripper holds at rest [kg].
         mass: of the part [kg].
@@ -62,10 +64,10 @@ def lost(time: float, arm: str, part: str, holds: float, mass: float) -> Mishap:
 
 
 def off_track(time: float, arm: str, model: Arm, error: Array, limits: Array) -> Mishap:
-    """Return what is said where joints are farther than the limits from where they were sent, (n,) each."""
+    """Return the mishap of joints that are farther than the limits from their planned positions, (n,) each."""
     joint = int((error / limits).argmax())
     revolute = model.joints[joint].revolute
-    amount = f"{error[joint] * 57.29577951308232:.3g} deg" if revolute else f"{error[joint] * 1e3:.3g} mm"
+    amount = f"{math.degrees(error[joint]):.3g} deg" if revolute else f"{error[joint] * 1e3:.3g} mm"
     return Mishap(
         time=time,
         arm=arm,
@@ -77,7 +79,7 @@ def off_track(time: float, arm: str, model: Arm, error: Array, limits: Array) ->
 
 
 def pressed_too_deep(time: float, arm: str, depth: float, allowed: float) -> Mishap:
-    """Return what is said where an arm presses into the plane of contact deeper than the cell allows [m]."""
+    """Return the mishap of an arm that presses into the plane of contact deeper than the cell allows [m]."""
     return Mishap(
         time=time,
         arm=arm,
@@ -89,7 +91,7 @@ def pressed_too_deep(time: float, arm: str, depth: float, allowed: float) -> Mis
 
 
 def unstable(time: float) -> Mishap:
-    """Return what is said where the numbers of a world have no meaning any more."""
+    """Return the mishap of a world whose numbers have no meaning any more."""
     return Mishap(
         time=time,
         arm=None,

@@ -16,6 +16,7 @@ from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.cell.model import Cell
 from armwright.dynamics.inertia_matrix import mass_matrix
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies, has_solids
 from armwright.physics.mjcf_text import spec_text
 from armwright.physics.plant import PlantArm, add_arm, arm_indices, new_world
@@ -109,8 +110,7 @@ class _Names:
 
 def _set_one_sided_limits(spec: Any, plant: PlantArm) -> None:
     """Limit joints that have one end: MuJoCo has a range of two, or none."""
-    import mujoco  # noqa: PLC0415 - only worlds need it
-
+    mujoco = load_mujoco()
     for i, joint in enumerate(plant.arm.joints, 1):
         ends = joint.limits.lower, joint.limits.upper
         if sum(map(math.isfinite, ends)) == 1:
@@ -153,7 +153,8 @@ def _lost_of_arm(arm: Arm, spec: Any, plant: PlantArm) -> list[str]:
         error = _mass_matrix_error(arm, spec, plant.name)
         names = ", ".join(_short(inertia.body) for inertia in changed)
         lost.append(
-            f"the mass matrix of the file differs by up to {error:.2g} of its largest entry, because of {names}"
+            f"the mass matrix of the file differs by up to {error:.2g} of its largest entry in {_COMPARED} random "
+            f"configurations, because of {names}"
         )
     return lost
 
@@ -165,8 +166,7 @@ def _short(body: str) -> str:
 
 def _mass_matrix_error(arm: Arm, spec: Any, name: str) -> float:
     """Return the largest difference of the mass matrices of an arm and of the file, by the largest entry."""
-    import mujoco  # noqa: PLC0415 - only worlds need it
-
+    mujoco = load_mujoco()
     model = spec.compile()
     data, indices = mujoco.MjData(model), arm_indices(model, name, arm.n)
     rng, worst = np.random.default_rng(_SEED), 0.0

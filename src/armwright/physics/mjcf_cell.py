@@ -15,9 +15,10 @@ from armwright.arm.mjcf.tree import WORLD, MjcfTree
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm, ContactPlane
-from armwright.cell.scene import Fixture, Gripper, Part
+from armwright.cell.scene import USUAL_CONTACT_TIME, Fixture, Gripper, Part
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.inputs import file_path
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.mjcf import START
 from armwright.physics.world_model import FLOOR, PIECE, PLATE
 from armwright.spatial.poses import homogeneous
@@ -50,7 +51,7 @@ def read_cell_mjcf(path: Path | str) -> CellReading:
     keyframe ``start``, arms and parts stand as there.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         FileFormatError: the file is missing, broken, has no arm of such a name, or things that no cell has.
     """
     path = file_path(path)
@@ -151,15 +152,21 @@ def _fixtures(model: Any) -> dict[str, Fixture]:
     for geom, name in enumerate(names):
         solid = solid_of(model, geom)
         if name not in cut and name != FLOOR and solid is not None and _NAME.fullmatch(name):
-            friction = float(model.geom_friction[geom][0])
-            fixtures[name] = Fixture(name=name, shape=solid.shape, pose=solid.pose, friction=friction)
+            # A time constant is above 0; other numbers are a stiffness and a damping.
+            time = float(model.geom_solref[geom][0])
+            fixtures[name] = Fixture(
+                name=name,
+                shape=solid.shape,
+                pose=solid.pose,
+                friction=float(model.geom_friction[geom][0]),
+                contact_time=time if time > 0 else USUAL_CONTACT_TIME,
+            )
     return fixtures
 
 
 def _parts(model: Any, q: Array) -> dict[str, Part]:
     """Return the free bodies of one geom that have names of frames, where they stand."""
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     parts = {}
     for body in range(1, model.nbody):
         name, joint, geom = model.body(body).name, int(model.body_jntadr[body]), int(model.body_geomadr[body])

@@ -8,6 +8,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
+from armwright.mujoco_library import load_mujoco
+
 # How something is called in the text, from its kind and its name in the specification.
 Rename: TypeAlias = Callable[[str, str], str]
 
@@ -22,21 +24,8 @@ _JOINT = (
     *("springref", "actuatorfrcrange"),
 )
 _GEOM = (
-    *(
-        "type",
-        "size",
-        "pos",
-        "quat",
-        "mass",
-        "contype",
-        "conaffinity",
-        "condim",
-        "friction",
-        "priority",
-        "margin",
-        "gap",
-    ),
-    *("solref", "solimp", "adhesion", "group", "rgba"),
+    *("type", "size", "pos", "quat", "mass", "contype", "conaffinity", "condim", "friction", "priority"),
+    *("margin", "gap", "solref", "solimp", "adhesion", "group", "rgba"),
 )
 _GENERAL = (
     *("forcelimited", "forcerange", "ctrllimited", "ctrlrange", "gear", "gaintype", "gainprm", "biastype", "biasprm"),
@@ -58,8 +47,7 @@ def spec_text(spec: Any, name: str, comment: Iterable[str], rename: Rename = lam
         comment: sentences at the beginning of the file.
         rename: what names are in the text.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     root = Element("mujoco", model=name)
     SubElement(root, "compiler", angle="radian")
     plain = mujoco.MjSpec()
@@ -145,9 +133,7 @@ def _add_pairs(root: Element, spec: Any, rename: Rename, mujoco: Any) -> None:
         element = _named(contact, "pair", "pair", pair, rename)
         element.set("geom1", rename("geom", pair.geomname1))
         element.set("geom2", rename("geom", pair.geomname2))
-        _set(
-            element, pair, plain, ("condim", "friction", "solref", "solreffriction", "solimp", "gap", "margin"), mujoco
-        )
+        _set(element, pair, plain, _PAIR, mujoco)
 
 
 def _named(element: Element, tag: str, kind: str, item: Any, rename: Rename) -> Element:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,10 +12,10 @@ import numpy.typing as npt
 from armwright.arrays import Array
 from armwright.cell.scene import Camera
 from armwright.errors import MissingExtraError
-from armwright.files.output import write_file
+from armwright.extras import opencv
+from armwright.mujoco_library import graphics, load_mujoco
 from armwright.physics.geoms import quaternion
-from armwright.physics.graphics import graphics, load_mujoco
-from armwright.physics.markers import opencv
+from armwright.physics.markers import PURPOSE
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous
 
@@ -83,15 +82,15 @@ class Photographer:
             MissingExtraError: OpenGL or OpenCV is missing.
         """
         mujoco = load_mujoco()
-        self._mujoco, self._cv2, self.model = mujoco, opencv(), model
-        self._sights = {name: _View(camera) for name, camera in cameras.items()}
+        self._mujoco, self._cv2, self.model = mujoco, opencv(PURPOSE), model
+        self._views = {name: _View(camera) for name, camera in cameras.items()}
         self.graphics, context = graphics()
         self._scene = mujoco.MjvScene(model, _most_geometries(model))
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self._scene.flags[flag] = 0
         self._options = mujoco.MjvOption()
         self._options.geomgroup[:], self._options.sitegroup[:] = DRAWN_GROUPS, 0
-        width, height = np.max([view.size for view in self._sights.values()], axis=0).tolist()
+        width, height = np.max([view.size for view in self._views.values()], axis=0).tolist()
         self._context = _opened(context, self.graphics, width, height)
         self._drawing = self._drawing_context(width, height)
 
@@ -103,7 +102,7 @@ class Photographer:
             name: of the camera.
             seed: of the noise of the pixels.
         """
-        view = self._sights[name]
+        view = self._views[name]
         pixels = self._draw(data, view)
         if view.maps is not None:
             pixels = self._cv2.remap(pixels, *view.maps, self._cv2.INTER_LINEAR)
@@ -229,16 +228,6 @@ def png(picture: Picture) -> bytes:
     Raises:
         MissingExtraError: OpenCV is missing.
     """
-    made, content = opencv().imencode(".png", picture[:, :, ::-1])
+    made, content = opencv(PURPOSE).imencode(".png", picture[:, :, ::-1])
     assert made  # noqa: S101 - there is a writer of PNG in every OpenCV
     return bytes(content)
-
-
-def save_picture(path: Path, picture: Picture) -> None:
-    """Write a picture to a PNG file, or leave what was there before.
-
-    Raises:
-        OutputError: it cannot be written.
-        MissingExtraError: OpenCV is missing.
-    """
-    write_file(path, png(picture))

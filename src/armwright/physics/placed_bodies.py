@@ -9,8 +9,7 @@ import attrs
 
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.part_poses import PartPoses
-from armwright.physics.cell_bodies import arm_bodies, has_solids
-from armwright.physics.clearance import Body
+from armwright.physics.cell_bodies import Body, arm_bodies, has_solids
 from armwright.physics.hand_solids import gripper_solids
 from armwright.physics.self_collision import self_pairs
 from armwright.spatial.shapes import Solid, convex_solids
@@ -26,7 +25,7 @@ class Role:
         in_gripper: whether it is of the gripper.
         in_hand: whether it is of the gripper, or of the last link of an arm without one.
         grips: whether it touches the parts that a gripper holds.
-        guessed: whether it is a guess what it looks like.
+        guessed: whether its shape is a guess.
     """
 
     arm: str | None = None
@@ -122,7 +121,7 @@ class CellBodies:
             self._number_in_hand[body.arm] if body.arm is not None and (role.part or role.in_gripper) else body.link
             for body, role in zip(bodies, self.roles, strict=True)
         ]
-        found = []
+        pairs = []
         for (i, a), (j, b) in combinations(enumerate(bodies), 2):
             if a.arm is None or a.arm != b.arm:
                 # A base stands, as fixtures do.
@@ -130,5 +129,5 @@ class CellBodies:
             else:
                 counts = (min(numbers[i], numbers[j]), max(numbers[i], numbers[j])) in self._self_pairs[a.arm]
             if counts:
-                found.append((i, j))
-        return found
+                pairs.append((i, j))
+        return pairs

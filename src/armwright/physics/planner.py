@@ -2,7 +2,7 @@
 
 A path is found by RRT-Connect of OMPL among configurations that are checked one by one, each distance in metres that
 the joints move the arm by. Then it is shortened, its corners are rounded, and it is timed within all limits. What comes
-out is decided along the whole way by ``ClearanceChecker.first_contact``; where that finds a contact the corner there is
+out is checked along the whole path by ``ClearanceChecker.first_contact``; where that finds a contact the corner is
 drawn tighter, or the path is found again with closer checks. The budget is counted in checked configurations and all
 random numbers come from a seed, so the same question always has the same answer, to the last bit.
 

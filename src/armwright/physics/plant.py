@@ -13,14 +13,15 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arm.model import Arm, Joint, Link, Motor
+from armwright.arm.drive import Motor
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.physics.clearance import Body
-from armwright.physics.geoms import add_geom, place, quaternion
-from armwright.physics.graphics import load_mujoco
+from armwright.mujoco_library import load_mujoco
+from armwright.physics.cell_bodies import Body
+from armwright.physics.geoms import add_geom, placement, principal_inertia, quaternion
 from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
@@ -91,7 +92,6 @@ def new_world(gravity: Array, timestep: float) -> Any:
         timestep: [s].
     """
     mujoco = load_mujoco()
-
     spec = mujoco.MjSpec()
     # Angles of joints are given in radians.
     spec.compiler.degree = False
@@ -105,8 +105,7 @@ def new_world(gravity: Array, timestep: float) -> Any:
 
 def finish(spec: Any, arms: tuple[PlantArm, ...]) -> Any:
     """Compile a world and give its arms the inertia that they have."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     model = spec.compile()
     if arms:
         for arm in arms:
@@ -129,16 +128,15 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
     Raises:
         UnsupportedArmError: masses are unknown, or a joint moves nothing that has any; the link is named.
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     refuse_massless(weighed(arm))
     # Frames 0 to n and the tool, at zero positions, in the base frame.
     frames = link_poses(arm, np.zeros(arm.n))
-    body = spec.worldbody.add_body(name=f"{name}/base", **place(base))
+    body = spec.worldbody.add_body(name=f"{name}/base", **placement(base))
     links = [body]
     behind, inertias = np.eye(4), []
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
-        body = body.add_body(name=f"{name}/link{i}", **place(inverse(behind) @ frames[i]))
+        body = body.add_body(name=f"{name}/link{i}", **placement(inverse(behind) @ frames[i]))
         inertias.append(_set_inertia(body, link))
         _add_joint(body, f"{name}/joint{i}", joint, motor, inverse(frames[i]) @ frames[i - 1])
         motor_of_joint = spec.add_actuator(
@@ -150,7 +148,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
             motor_of_joint.forcerange = (-joint.limits.effort, joint.limits.effort)
         links.append(body)
         behind = frames[i]
-    tool = body.add_body(name=f"{name}/tool", **place(inverse(behind) @ frames[arm.n + 1]))
+    tool = body.add_body(name=f"{name}/tool", **placement(inverse(behind) @ frames[arm.n + 1]))
     tool.add_site(name=f"{name}/tool")
     for number, it in enumerate(bodies, 1):
         # What is fixed to the base is told in frame 0 of the table. The links have their inertia already.
@@ -162,9 +160,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
 
 def _set_inertia(body: Any, link: Link) -> Inertia:
     """Give a body the inertia of a link, or one that the compiler takes."""
-    moments, axes = np.linalg.eigh(link.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
+    moments, axes = principal_inertia(link.inertia)
     padded = np.maximum(moments, _LEAST_MOMENT if moments.min() <= 0 else 0.0)
     lacking = padded[2] - padded[0] - padded[1]
     if lacking > 0:
@@ -185,8 +181,7 @@ def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) 
         motor: its drive.
         before: (4, 4) frame i-1 seen from the link's frame at zero position: the joint is about or along its z.
     """
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     kinds, limits = mujoco.mjtJoint, joint.limits
     added = body.add_joint(
         name=name,
@@ -195,16 +190,13 @@ def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) 
         pos=before[:3, 3] if joint.revolute else np.zeros(3),
         armature=motor.inertia,
         damping=[motor.viscous, 0.0, 0.0],
-        # The part that both directions share; ``dry_offsets`` has the rest.
+        # The part that both directions share; ``friction`` has the rest.
         frictionloss=(motor.coulomb_forward + motor.coulomb_backward) / 2,
     )
+    if joint.spring.stiffness:
+        added.stiffness, added.springref = [joint.spring.stiffness, 0.0, 0.0], joint.spring.rest
     if np.isfinite((limits.lower, limits.upper)).all():
         added.limited, added.range = mujoco.mjtLimited.mjLIMITED_TRUE, (limits.lower, limits.upper)
-
-
-def dry_offsets(arm: Arm) -> Array:
-    """Return the constant efforts (n,) that make two-sided dry friction of friction alike in both directions."""
-    return (arm.motor_values("coulomb_backward") - arm.motor_values("coulomb_forward")) / 2
 
 
 def arm_indices(model: Any, name: str, n: int) -> ArmIndices:

@@ -10,7 +10,8 @@ from armwright.cell.hardware import DeviceError
 from armwright.cell.model import Cell
 from armwright.cell.scene import Marker, Sight
 from armwright.errors import InvalidValueError
-from armwright.physics.markers import CELLS, dictionary, marker_corners, opencv
+from armwright.extras import opencv
+from armwright.physics.markers import CELLS, PURPOSE, dictionary, marker_corners
 from armwright.physics.pictures import Picture
 from armwright.spatial.lens import Lens
 from armwright.spatial.poses import homogeneous, inverse_pose
@@ -35,7 +36,7 @@ _TOLD_APART = 2.0
 
 @attrs.frozen(kw_only=True, eq=False)
 class Target:
-    """What is looked for in a picture.
+    """What is searched for in a picture.
 
     Attributes:
         name: in messages.
@@ -54,7 +55,7 @@ class Target:
 
 
 def target_of(cell: Cell, sight: Sight) -> Target:
-    """Return what to look for in a picture for a sight of a cell.
+    """Return what is searched for in a picture for a sight of a cell.
 
     Raises:
         InvalidValueError: the part has no marker.
@@ -77,7 +78,7 @@ def find_markers(picture: Picture, lens: Lens) -> dict[int, Array]:
     Raises:
         MissingExtraError: OpenCV is missing.
     """
-    cv2 = opencv()
+    cv2 = opencv(PURPOSE)
     grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
     found, numbers, _ = cv2.aruco.ArucoDetector(dictionary(), cv2.aruco.DetectorParameters()).detectMarkers(grey)
     brightness = grey.astype(np.float64)
@@ -107,7 +108,7 @@ def _refined(brightness: Array, corners: Array, lens: Lens) -> Array | None:
 def _edge(brightness: Array, start: Array, end: Array, lens: Lens) -> Array | None:
     """Return the line n x + m y = d, (3,), of directions with z = 1 along an edge from black to white; None if none.
 
-    Across the edge, what is missing from white tells how far the black reaches, however blurred the edge is.
+    Across the edge, the brightness missing from white gives how far the black reaches, however blurred the edge is.
     """
     length = float(np.linalg.norm(end - start))
     outwards = np.array([end[1] - start[1], start[0] - end[0]]) / length
@@ -148,7 +149,7 @@ def target_pose(corners: Array, lens: Lens, X_WC: Array, target: Target) -> Arra
         target: what the marker is on.
 
     Raises:
-        DeviceError: the marker is not at the height where it is looked for, or its pose is not told apart from another.
+        DeviceError: the marker is at another height than expected, or its pose cannot be distinguished from another.
     """
     rays = lens.rays(corners)
     if target.height is None:
@@ -166,7 +167,7 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
     Args:
         rays: (4, 3) directions to the corners of the marker in the world.
         eye: (3,) position of the camera.
-        target: what is looked for.
+        target: what is searched for.
         height: of its origin [m].
     """
     name, number = target.name, target.marker.number
@@ -174,7 +175,7 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
     arms = (marker_corners(target.marker.size) @ marker[:3, :3].T + marker[:3, 3]) @ target.start[:3, :3].T
     heights = height + arms[:, 2]
     if (np.abs(rays[:, 2]) < _FLAT * np.linalg.norm(rays, axis=1)).any():
-        raise DeviceError(f"marker {number} of {name} is seen, but too flat over its plane to tell where it is")
+        raise DeviceError(f"marker {number} of {name} is seen, but from too flat an angle to compute its position")
     seen = eye[:2] + ((heights - eye[2]) / rays[:, 2])[:, None] * rays[:, :2]
     here, there = arms[:, :2] - arms[:, :2].mean(axis=0), seen - seen.mean(axis=0)
     cosine, sine = (here * there).sum(), (here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]).sum()
@@ -184,10 +185,10 @@ def _standing_pose(rays: Array, eye: Array, target: Target, height: float) -> Ar
         raise DeviceError(f"marker {number} of {name} is seen, but tilted: {name} does not stand as at the start")
     if not abs(larger - 1) < _WRONG_SIZE:
         # What is nearer to the camera looks larger.
-        off = (1 - 1 / larger) * float(eye[2] - heights.mean()) * 1e3
+        offset = (1 - 1 / larger) * float(eye[2] - heights.mean()) * 1e3
         raise DeviceError(
-            f"marker {number} of {name} is seen, but at another height: it looks {abs(off):.0f} mm "
-            f"{'higher' if off > 0 else 'lower'} than in the vision of {name}"
+            f"marker {number} of {name} is seen, but at another height: it looks {abs(offset):.0f} mm "
+            f"{'higher' if offset > 0 else 'lower'} than in the vision of {name}"
         )
     return homogeneous(R @ target.start[:3, :3], (*(seen.mean(axis=0) - R[:2, :2] @ arms[:, :2].mean(axis=0)), height))
 
@@ -196,20 +197,21 @@ def _free_pose(rays: Array, X_WC: Array, target: Target) -> Array:
     """Return the pose of the marker of a target in the world of which nothing is known.
 
     Raises:
-        DeviceError: another pose looks nearly the same.
+        DeviceError: another pose gives nearly the same picture.
 
     Source:
         Collins & Bartoli (2014), Infinitesimal plane-based pose estimation.
     """
-    cv2 = opencv()
+    cv2 = opencv(PURPOSE)
     size, seen = target.marker.size, np.ascontiguousarray(rays[:, :2])
     flat = marker_corners(size) * (1, 1, 0)
     _, rotations, positions, errors = cv2.solvePnPGeneric(flat, seen, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE_SQUARE)
     first, second = np.ravel(errors)[:2]
     if second < _TOLD_APART * first:
         raise DeviceError(
-            f"marker {target.marker.number} of {target.name} is seen, but two orientations of it are not told apart: "
-            "look from a smaller distance, more from the side, or at something that stands at a known height"
+            f"marker {target.marker.number} of {target.name} is seen, but two orientations of it cannot be "
+            "distinguished: look from a smaller distance, more from the side, or at something that stands at a "
+            "known height"
         )
     rotation, position = cv2.solvePnPRefineLM(flat, seen, np.eye(3), None, rotations[0], positions[0])
     X_CM = homogeneous(cv2.Rodrigues(rotation)[0], np.ravel(position))

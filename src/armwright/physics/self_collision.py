@@ -23,8 +23,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import RESOLUTION, Body
+from armwright.physics.cell_bodies import Body, arm_bodies
+from armwright.physics.clearance import RESOLUTION
 from armwright.physics.distances import Distances
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere, farthest
 
@@ -95,7 +95,7 @@ def self_pairs(arm: Arm, bodies: Iterable[Body] | None = None, held: Iterable[Bo
 
 
 def random_configurations(arm: Arm) -> Array:
-    """Return the configurations (10000, n) that tell which bodies always touch: within limits, the same every time."""
+    """Return the configurations (10000, n) by which bodies always touch: within limits, the same every time."""
     lower, upper = ranges(arm)
     draws = np.random.default_rng(_SEED).random((CONFIGURATIONS, arm.n))
     return np.asarray(lower + draws * (upper - lower))
@@ -124,7 +124,7 @@ class _Touching:
         self._frames[:, arm.n + 1] = self._frames[:, arm.n]
 
     def always(self, a: int, b: int) -> bool:
-        """Whether two bodies touch in all configurations, as far as a motion can tell."""
+        """Whether two bodies touch in all configurations, to the resolution of motions."""
         return self._all(a, b, slice(0, _FIRST)) and self._all(a, b, slice(_FIRST, CONFIGURATIONS))
 
     def _all(self, a: int, b: int, some: slice) -> bool:
@@ -132,26 +132,26 @@ class _Touching:
         frames_a, frames_b = self._frames[some, a], self._frames[some, b]
         touch = np.zeros(len(frames_a), dtype=bool)
         unknown: list[tuple[tuple[int, int], tuple[int, int], Flags]] = []
-        for i, one in enumerate(self._solids[a]):
+        for i, solid in enumerate(self._solids[a]):
             for j, other in enumerate(self._solids[b]):
-                surely, maybe = touch_bounds(one, other, frames_a, frames_b)
+                surely, maybe = touch_bounds(solid, other, frames_a, frames_b)
                 touch |= surely
                 if (maybe & ~surely).any():
                     unknown.append(((a, i), (b, j), maybe & ~surely))
         for k in np.flatnonzero(~touch).tolist():
-            if not any(maybe[k] and self._distance(one, other, some.start + k) for one, other, maybe in unknown):
+            if not any(maybe[k] and self._distance(first, second, some.start + k) for first, second, maybe in unknown):
                 return False
         return True
 
-    def _distance(self, one: tuple[int, int], other: tuple[int, int], k: int) -> bool:
+    def _distance(self, first: tuple[int, int], second: tuple[int, int], k: int) -> bool:
         """Whether two solids, each by its body and its number there, touch in a configuration."""
         if self._distances is None:
             every = [(body, i) for body, own in enumerate(self._solids) for i in range(len(own))]
             self._numbers = {key: number for number, key in enumerate(every)}
             self._distances = Distances([self._solids[body][i].shape for body, i in every])
-        for body, i in (one, other):
-            self._distances.place(self._numbers[body, i], self._frames[k, body] @ self._solids[body][i].pose)
-        return self._distances.between(self._numbers[one], self._numbers[other], 2 * RESOLUTION) < RESOLUTION
+        for body, i in (first, second):
+            self._distances.set_pose(self._numbers[body, i], self._frames[k, body] @ self._solids[body][i].pose)
+        return self._distances.between(self._numbers[first], self._numbers[second], 2 * RESOLUTION) < RESOLUTION
 
 
 class _Rod(NamedTuple):
@@ -165,7 +165,7 @@ class _Rod(NamedTuple):
 def touch_bounds(one: Solid, other: Solid, frames: Array, others: Array) -> tuple[Flags, Flags]:
     """Return in which configurations (k,) two solids touch for sure, and in which they may.
 
-    Capsules within the solids, and capsules around them, tell: for capsules and spheres that is all.
+    Capsules within the solids, and capsules around them, bound their distance: for capsules and spheres exactly.
 
     Args:
         one: a solid.

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 import attrs
 import numpy as np
 
+from armwright.arm.drive import Motor
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
+from armwright.dynamics.drives import friction_law
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.plant import ArmIndices, dry_offsets
+from armwright.physics.friction import constant_efforts, dry_offsets
+from armwright.physics.plant import ArmIndices
 
 # The integral of errors is fed back with this part of the cube of the bandwidth.
 _INTEGRAL = 0.2
-# Dry friction is compensated where the reference moves faster than this [rad/s, m/s].
+# Dry friction is compensated in full where the reference moves faster than this [rad/s, m/s].
 _MOVING = 1e-3
 # Part of a new difference of positions in the estimated speed.
 _SMOOTHING = 0.2
@@ -26,11 +30,19 @@ _TICK_TOLERANCE = 1e-9
 
 
 class Reference(NamedTuple):
-    """Where the joints of an arm are sent at a moment: positions, speeds and accelerations, (n,) each."""
+    """Where the joints of an arm are sent at a moment, (n,) each.
+
+    Attributes:
+        q: positions [rad] or [m].
+        qd: speeds.
+        qdd: accelerations.
+        friction: of the believed arm at these speeds, but the viscous one [N m] or [N].
+    """
 
     q: Array
     qd: Array
     qdd: Array
+    friction: Array
 
 
 class TorqueLaw(Protocol):
@@ -50,19 +62,29 @@ class TorqueLaw(Protocol):
 class Sent:
     """A trajectory on the ticks of the servo."""
 
-    def __init__(self, trajectory: Trajectory, tick: int, period: float) -> None:
-        """Begin at a tick."""
+    def __init__(
+        self, trajectory: Trajectory, tick: int, period: float, friction: Callable[[Array], Array] = np.zeros_like
+    ) -> None:
+        """Begin at a tick.
+
+        Args:
+            trajectory: from that tick on.
+            tick: of the servo.
+            period: of the servo [s].
+            friction: returns the friction at speeds (k, n), see ``Reference``; none where it is left out.
+        """
         self.trajectory, self.tick = trajectory, tick
         count = math.ceil(trajectory.duration / period - _TICK_TOLERANCE) + 1
         t = np.minimum(np.arange(count) * period, trajectory.duration)
         self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
         # Then the arm stands.
         self._qd[-1] = self._qdd[-1] = 0.0
+        self._friction = friction(self._qd)
 
     def at(self, tick: int) -> Reference:
         """Return where the joints are sent at a tick."""
         index = min(max(tick - self.tick, 0), len(self._q) - 1)
-        return Reference(self._q[index], self._qd[index], self._qdd[index])
+        return Reference(self._q[index], self._qd[index], self._qdd[index], self._friction[index])
 
     def configuration(self, time: float, period: float) -> Array:
         """Return the positions (n,) at any time from its beginning on."""
@@ -71,11 +93,19 @@ class Sent:
 
 @attrs.define(eq=False)
 class Measured:
-    """What the servo did at a tick: positions, speeds and efforts, (n,) each."""
+    """What the servo read and did at a tick, (n,) each.
+
+    Attributes:
+        q: joint positions, as the sensors read them.
+        qd: joint speeds, as the sensors read them.
+        tau: efforts of the motors.
+        actual: joint positions, as they are.
+    """
 
     q: Array
     qd: Array
     tau: Array
+    actual: Array
 
 
 class ArmServo:
@@ -103,14 +133,17 @@ class ArmServo:
             law: another controller; None for that of the settings.
         """
         self.arm, self.indices, self._period, self._settings, self._law = arm, indices, period, settings, law
-        # Compensated dry friction would chatter at rest with the measured speed: it follows the reference.
-        smooth = tuple(attrs.evolve(motor, coulomb_forward=0.0, coulomb_backward=0.0) for motor in arm.motors)
+        # Compensated friction would chatter at rest with the measured speed: what is not viscous follows the reference.
+        smooth = tuple(Motor(inertia=x.inertia, viscous=x.viscous, gear_ratio=x.gear_ratio) for x in arm.motors)
         self._compiled = compile_arm(attrs.evolve(arm, motors=smooth), quickly=True)
+        self._friction_law = friction_law(arm)
         forward, backward = arm.motor_values("coulomb_forward"), arm.motor_values("coulomb_backward")
         self._dry, self._lean = (forward + backward) / 2, -dry_offsets(arm)
-        self._offsets = dry_offsets(plant)
+        self._offsets = constant_efforts(plant)
         # What is known of a part in the hand: its mass [kg] at the tool point.
         self.load = 0.0
+        # Whether errors are not to be integrated: against what an arm leans on the integral would grow and grow.
+        self.leaning = False
         self._sums = np.zeros(arm.n)
         self._effort = arm.limits.effort
         # Noise is a part of the largest efforts; there is none of those that are not known.
@@ -133,9 +166,10 @@ class ArmServo:
 
     def drive(self, data: Any, t: float, reference: Reference) -> Measured:
         """Read the sensors, and command the motors until the next tick."""
-        q, qd = self._read(data)
+        actual = data.qpos[self.indices.positions]
+        q, qd = self._read(actual, data)
         if self._law is not None:
-            tau = np.asarray(self._law(t, q, qd, reference), dtype=np.float64)
+            tau = self._own_efforts(self._law, t, q, qd, reference)
         else:
             error = reference.q - q
             correction = self._kd * (reference.qd - qd) + self._kp * error + self._ki * self._sums
@@ -146,32 +180,59 @@ class ArmServo:
                 tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
                 if self.load:
                     tau = tau + self._load_efforts(q, reference.qdd + correction)
-            direction = np.tanh(reference.qd / _MOVING)
-            tau = tau + self._dry * direction + self._lean * np.abs(direction)
+            tau = tau + reference.friction
             # What a motor cannot give is not to be asked for twice.
-            self._sums += error * self._period * (np.abs(tau) < self._effort)
+            if not self.leaning:
+                self._sums += error * self._period * (np.abs(tau) < self._effort)
         tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
         data.ctrl[self.indices.motors] = tau
-        return Measured(q, qd, tau)
+        return Measured(q, qd, tau, actual)
+
+    def _own_efforts(self, law: TorqueLaw, t: float, q: Array, qd: Array, reference: Reference) -> Array:
+        """Return the efforts (n,) of a user's law.
+
+        Raises:
+            KindError: they are not real numbers.
+            ShapeError: they are not one for each joint.
+            InvalidValueError: one is NaN or infinite.
+        """
+        # The law may change the arrays that it is given.
+        efforts = law(t, q.copy(), qd.copy(), Reference(*(row.copy() for row in reference)))
+        return exact_shape(efforts, (self.arm.n,), f"efforts of the torque law of '{self.arm.name}' at {t:.3f} s")
+
+    def friction(self, qd: Array) -> Array:
+        """Return the friction (k, n) of the believed arm at speeds (k, n) of its reference, but the viscous one."""
+        direction, fading = np.tanh(qd / _MOVING), self._friction_law.fading(qd)
+        dry = self._dry if fading is None else self._dry + fading
+        return np.asarray(dry * direction + self._lean * np.abs(direction) + self._friction_law.smooth(qd))
+
+    def configuration(self, data: Any) -> Array:
+        """Return the joint positions (n,) as the sensors read them at the latest tick."""
+        if self._sensors.exact or not self._readings:
+            return np.array(data.qpos[self.indices.positions])
+        return self._latest().copy()
 
     def _load_efforts(self, q: Array, qdd: Array) -> Array:
         """Return what a part in the hand asks for beside the arm (n,); its centripetal acceleration is left out."""
         J = self._compiled.jacobian(q)[:3]
         return np.asarray(J.T @ (self.load * (J @ qdd - self.arm.gravity)))
 
-    def _read(self, data: Any) -> tuple[Array, Array]:
+    def _read(self, q: Array, data: Any) -> tuple[Array, Array]:
         """Return positions and speeds as the controller knows them."""
-        q = data.qpos[self.indices.positions]
         if self._sensors.exact:
             return q, data.qvel[self.indices.speeds]
         if self._count is not None:
             q = np.round(q / self._count) * self._count
         keep = self._sensors.delay + 2
         self._readings = (*self._readings, q)[-keep:]
-        latest, before = self._readings[max(0, len(self._readings) - 1 - self._sensors.delay)], self._readings[0]
+        latest, before = self._latest(), self._readings[0]
         # Speed is known by differences alone, smoothed over a few ticks.
         self._speed += _SMOOTHING * ((latest - before) / self._period - self._speed)
         return latest, self._speed
+
+    def _latest(self) -> Array:
+        """Return the reading that has come to the controller last."""
+        return self._readings[max(0, len(self._readings) - 1 - self._sensors.delay)]
 
     def copy(self) -> ArmServo:
         """Return a servo in the same state."""

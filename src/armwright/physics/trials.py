@@ -10,10 +10,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm
-from armwright.cell.scene import Camera, Part
+from armwright.cell.scene import Camera, Part, Spread
 from armwright.cell.trials import Interval
-from armwright.errors import InvalidValueError
-from armwright.physics.world import PhysicsCell, drawn_parts, drawn_pose
+from armwright.errors import InvalidValueError, counted
+from armwright.physics.draws import drawn_frames, drawn_parts, drawn_pose
+from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector
 from armwright.spatial.shapes import support
@@ -22,11 +23,11 @@ from armwright.spatial.shapes import support
 _MAX_DRAWS = 100
 # A part is at rest that is no faster than this [m/s], [rad/s], for so long [s]; the world goes on for so long [s].
 _REST_SPEED, _REST_TURN, _REST_TIME, _PATIENCE = 2e-3, 0.05, 0.1, 1.0
-# How often it is looked at [s].
-_LOOK = 0.01
+# How often that is checked [s].
+_INTERVAL = 0.01
 # What is wrong where an arm has pressed on what it should not.
 _TOUCHED = "R604"
-MOVING, HELD, MISPLACED = "moving", "not let go", "misplaced"
+MOVING, UNRELEASED, MISPLACED = "moving", "not let go", "misplaced"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -36,16 +37,18 @@ class Case:
     Attributes:
         cell: with its markers, cameras and sensors as they are in this trial.
         parts: as they are in its world, by name.
+        frames: (4, 4) where they are in its world, by name.
         seed: of the noise.
     """
 
     cell: Cell
     parts: Mapping[str, Part]
+    frames: Mapping[str, Array]
     seed: int
 
     def world(self) -> PhysicsCell:
         """Return the world of the trial at its start."""
-        return PhysicsCell(self.cell, seed=self.seed, parts=self.parts)
+        return PhysicsCell(self.cell, seed=self.seed, parts=self.parts, frames=self.frames)
 
 
 @attrs.frozen(kw_only=True)
@@ -56,7 +59,7 @@ class Verdict:
         cause: why the trial fails, as a code or ``moving``, ``not let go``, ``misplaced``; empty where it succeeds.
         message: the cause in words; empty where it succeeds.
         distance: of the part that is farthest from its goal [m].
-        angle: of the part that is turned most from its goal [rad].
+        angle: of the part that is rotated farthest from its goal [rad].
     """
 
     cause: str = ""
@@ -103,13 +106,15 @@ def _drawn_case(cell: Cell, rng: np.random.Generator) -> Case:
         name: attrs.evolve(it, pose=drawn_pose(it.pose, trials.poses[name], rng)) if name in trials.poses else it
         for name, it in cell.markers.items()
     }
+    spreads = {name: trials.poses.get(name, cell.spreads.get(name, Spread())) for name in cell.frames}
+    frames = drawn_frames(attrs.evolve(cell, spreads={name: it for name, it in spreads.items() if it != Spread()}), rng)
     drawn = attrs.evolve(
         cell,
         markers=markers,
         cameras={name: _noisy_camera(it, trials.noise.pixels, rng) for name, it in cell.cameras.items()},
         arms={name: _noisy_arm(it, trials.noise.force, trials.noise.effort, rng) for name, it in cell.arms.items()},
     )
-    return Case(cell=drawn, parts=parts, seed=int(rng.integers(2**63)))
+    return Case(cell=drawn, parts=parts, frames=frames, seed=int(rng.integers(2**63)))
 
 
 def _between(interval: Interval | None, value: float, rng: np.random.Generator) -> float:
@@ -145,19 +150,15 @@ def judge(world: PhysicsCell, cell: Cell, now: float, ended_by: tuple[str, str] 
     moving = _come_to_rest(world, cell, now)
     errors = {
         part: placing_error(world.true_pose(part), goal_pose(cell, part, world), cell.parts[part])
-        for part in _goals(cell)
+        for part in cell.trials.goals
     }
     cause, message = ended_by or _fault(world, cell, moving, errors) or ("", "")
     return Verdict(
         cause=cause,
-        message=message,
+        message=f"{message}{_before(world)}" if cause in {MOVING, UNRELEASED, MISPLACED} else message,
         distance=max((distance for distance, _ in errors.values()), default=0.0),
         angle=max((angle for _, angle in errors.values()), default=0.0),
     )
-
-
-def _goals(cell: Cell) -> tuple[str, ...]:
-    return tuple(cell.trials.goals)
 
 
 def _fault(
@@ -169,9 +170,9 @@ def _fault(
             return _TOUCHED, f"{mishap.message} at {mishap.time:.3f} s"
     for part in moving:
         return MOVING, f"{part} still moves {_PATIENCE:g} s after the end"
-    for part in _goals(cell):
+    for part in cell.trials.goals:
         if arms := world.touching_arms(part):
-            return HELD, f"{part} is touched by {', '.join(arms)}"
+            return UNRELEASED, f"{part} is touched by {', '.join(arms)}"
     for part, (distance, angle) in errors.items():
         goal = cell.trials.goals[part]
         if distance > goal.distance or angle > goal.angle:
@@ -180,15 +181,24 @@ def _fault(
     return None
 
 
+def _before(world: PhysicsCell) -> str:
+    """Return which mishap the program dealt with last, as that may be why it went wrong; nothing where none was."""
+    if not world.mishaps:
+        return ""
+    last = world.mishaps[-1]
+    count = counted(len(world.mishaps), "mishap")
+    return f"; {count} before, the last {last.code} at {last.time:.3f} s: {last.message}"
+
+
 def _come_to_rest(world: PhysicsCell, cell: Cell, now: float) -> tuple[str, ...]:
     """Let a world go on until all parts with a goal have been at rest for some time; return those that still move."""
-    moving, rest = _goals(cell), 0
-    for look in range(1, round(_PATIENCE / _LOOK) + 1):
-        while world.advance(now + look * _LOOK) is not None:
+    moving, resting = tuple(cell.trials.goals), 0
+    for check in range(1, round(_PATIENCE / _INTERVAL) + 1):
+        while world.advance(now + check * _INTERVAL) is not None:
             pass
-        fast = tuple(part for part in _goals(cell) if _moves(world, part))
-        rest = 0 if fast else rest + 1
-        if rest * _LOOK >= _REST_TIME:
+        fast = tuple(part for part in cell.trials.goals if _moves(world, part))
+        resting = 0 if fast else resting + 1
+        if resting * _INTERVAL >= _REST_TIME:
             return ()
         moving = fast or moving
     return moving
@@ -202,15 +212,17 @@ def _moves(world: PhysicsCell, part: str) -> bool:
 def goal_pose(cell: Cell, part: str, world: PhysicsCell | None = None) -> Array:
     """Return the pose (4, 4) in the world at which a part stands upright on the frame, marker or part of its goal.
 
-    Another part is where it is in the world now, or where the cell has it at the start.
+    Another part is where it is in the world now, or where the cell has it at the start; so is a frame.
     """
     at = cell.trials.goals[part].at
     if at in cell.parts:
         top = support(cell.parts[at].shape, np.array([0.0, 0.0, 1.0]))
         X_WP = cell.parts[at].pose if world is None else world.true_pose(at)
         X_WG = X_WP @ homogeneous(np.eye(3), (0.0, 0.0, top))
+    elif at in cell.markers:
+        X_WG = cell.markers[at].pose
     else:
-        X_WG = cell.markers[at].pose if at in cell.markers else cell.tree().world(at)
+        X_WG = cell.tree().world(at) if world is None else world.true_frame(at)
     height = support(cell.parts[part].shape, np.array([0.0, 0.0, -1.0]))
     return np.asarray(X_WG @ homogeneous(np.eye(3), (0.0, 0.0, height)))
 

@@ -1,4 +1,4 @@
-"""Why a camera does not see a marker: what a world tells of it that a picture does not."""
+"""Why a camera does not see a marker: known from the world, not from the picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.scene import Camera
-from armwright.physics.graphics import load_mujoco
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.markers import marker_corners
 from armwright.physics.pictures import DRAWN_GROUPS, Picture, camera_pose
 from armwright.spatial.poses import homogeneous, inverse
@@ -52,7 +52,7 @@ def _indistinct(camera: Camera, picture: Picture, corners: Array, elevation: flo
     """Return what a marker lacks that nothing hides.
 
     Args:
-        camera: that looks at it.
+        camera: that took the picture.
         picture: with the marker.
         corners: (4, 3) of the marker in the frame of the camera.
         elevation: sine of the angle under which it is looked at.
@@ -96,17 +96,17 @@ def _hidden_by(model: Any, data: Any, X_WC: Array, corners: Array) -> str:
     points = corners[0] + s * (corners[1] - corners[0]) + t * (corners[3] - corners[0])
     distances = np.linalg.norm(points, axis=1)
     rays = np.ascontiguousarray(points @ X_WC[:3, :3].T / distances[:, None])
-    met, far = np.full(len(rays), -1, dtype=np.int32), np.zeros(len(rays))
+    hit, far = np.full(len(rays), -1, dtype=np.int32), np.zeros(len(rays))
     eye = np.ascontiguousarray(X_WC[:3, 3])
     groups = DRAWN_GROUPS
-    mujoco.mj_multiRay(model, data, eye, rays.ravel(), groups, 1, -1, met, far, None, len(rays), float(distances.max()))
-    before = (met >= 0) & (far >= 0) & (far < distances - _BEFORE)
-    bodies = Counter(int(model.geom_bodyid[geometry]) for geometry in met[before].tolist())
+    mujoco.mj_multiRay(model, data, eye, rays.ravel(), groups, 1, -1, hit, far, None, len(rays), float(distances.max()))
+    before = (hit >= 0) & (far >= 0) & (far < distances - _BEFORE)
+    bodies = Counter(int(model.geom_bodyid[geometry]) for geometry in hit[before].tolist())
     if not bodies:
         return ""
     body = bodies.most_common(1)[0][0]
     if body:
         return str(model.body(body).name)
     # What belongs to no body stands: there the geometry has the name.
-    first = next(geometry for geometry in met[before].tolist() if model.geom_bodyid[geometry] == 0)
+    first = next(geometry for geometry in hit[before].tolist() if model.geom_bodyid[geometry] == 0)
     return str(model.geom(first).name) or "something"

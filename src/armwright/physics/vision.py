@@ -1,4 +1,4 @@
-"""What the cameras of a cell answer when a program looks for a frame."""
+"""What the cameras of a cell answer when a program reads the vision of a frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError
 from armwright.cell.model import Cell
 from armwright.cell.scene import Camera
-from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.pictures import Photographer, Picture
 from armwright.physics.seeing import find_markers, target_of, target_pose
@@ -19,7 +18,7 @@ from armwright.physics.visibility import why_unseen
 
 
 class Look(NamedTuple):
-    """A look of a camera.
+    """A picture and what was found in it.
 
     Attributes:
         picture: that it took.
@@ -35,21 +34,6 @@ class Look(NamedTuple):
 def marker_name(name: str) -> str:
     """Return the name in a MuJoCo model of the marker of a part or of the scene."""
     return f"{name} marker"
-
-
-def refuse_blind_cameras(cell: Cell) -> None:
-    """Refuse a cell in which a camera looks for what it cannot find.
-
-    Raises:
-        InvalidValueError: there is no camera that takes pictures, or a part has no marker.
-    """
-    for frame, sight in cell.sights.items():
-        target_of(cell, sight)
-        if sight.camera is None:
-            raise InvalidValueError(
-                f"cell '{cell.name}' has no camera that takes a picture for {frame}; expected width, height and "
-                "fovy_deg in [camera], or a table in [cameras]"
-            )
 
 
 def camera_in_world(cell: Cell, camera: Camera, q: Array | None = None) -> Array:

@@ -1,11 +1,11 @@
 """Contacts that a MOVE is meant to make: which pairs of bodies may touch, when, and how deep.
 
-- The fingers of an arm may touch the part that its MOVE goes to, and the part that they have just let go until they
+- The fingers of an arm may touch the part that its MOVE goes to, and the part that they have just released until they
   are clear of it.
 - A held part may touch what stands, to 0.5 mm, on the first and last 10 mm of each stage: what it is taken from and
   set down on.
 - The tool and what it holds may touch anything in a MOVE that a force ends, and in the next one until it is clear.
-- What the fingers hold belongs to the hand; parts rest on what they stand on.
+- What the fingers hold belongs to the gripper; parts rest on what they stand on.
 """
 
 from __future__ import annotations
@@ -14,50 +14,27 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.trajectory import Trajectory, join
-from armwright.physics.clearance import Body, ClearanceChecker, Closest, Numbers, Window
+from armwright.motion.trajectory import Trajectory
+from armwright.physics.cell_bodies import Body
+from armwright.physics.clearance import ClearanceChecker, Closest, Numbers, Window
 from armwright.physics.placed_bodies import Role
+from armwright.physics.planned_move import PlannedMove
 
 # How deep a held part may touch what it stands on, and on which length of the path [m].
 REST_DEPTH, REST_LENGTH = 0.5e-3, 0.01
 # Fingers are clear of a part when they are so far from it [m].
 _CLEAR = 1e-3
 # Points on each stage at which the length of the path, and whether fingers are clear, are looked at.
-_LOOKS = 201
+_SAMPLES = 201
 # A held part that is so near to something at the start or the end of a stage stands on it there [m].
 _STANDS = 1e-3
 # Moments that are looked at together.
 _BLOCK = 32
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class PlannedMove:
-    """A MOVE before it begins.
-
-    Attributes:
-        arm: the arm.
-        stages: its trajectories, one after the other.
-        goal_part: the part that it goes to, to be grasped; None where it goes to none.
-        after_force: whether the tool may still press on something, because a force ended the MOVE before.
-        on_force: whether a force ends this one.
-    """
-
-    arm: str
-    stages: tuple[Trajectory, ...]
-    goal_part: str | None = None
-    after_force: bool = False
-    on_force: bool = False
-
-    @cached_property
-    def trajectory(self) -> Trajectory:
-        """All stages as one motion."""
-        return join(self.stages)
 
 
 class Surroundings(NamedTuple):
@@ -134,8 +111,8 @@ class WantedContacts:
 
     def _clear_time(self, numbers: Numbers) -> float:
         """Return when pairs are clear of each other for the first time [s]; infinity where they never are."""
-        times = np.concatenate([np.linspace(0.0, stage.duration, _LOOKS) for stage in self.move.stages])
-        times += np.repeat(self.starts, _LOOKS)
+        times = np.concatenate([np.linspace(0.0, stage.duration, _SAMPLES) for stage in self.move.stages])
+        times += np.repeat(self.starts, _SAMPLES)
         for first in range(0, len(times), _BLOCK):
             block = times[first : first + _BLOCK]
             distances = self._checker.distances_at(self._motions, block, numbers, 2 * _CLEAR)
@@ -168,7 +145,7 @@ class WantedContacts:
             return []
         zones = []
         for start, stage in zip(self.starts, self.move.stages, strict=True):
-            times = np.linspace(0.0, stage.duration, _LOOKS)
+            times = np.linspace(0.0, stage.duration, _SAMPLES)
             points = forward(self._arm, stage(times))[:, :3, 3]
             lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
             near = times[lengths <= REST_LENGTH], times[lengths[-1] - lengths <= REST_LENGTH]

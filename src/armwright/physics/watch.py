@@ -18,6 +18,7 @@ from armwright.physics.plant import arm_indices
 from armwright.physics.servo import Sent
 from armwright.physics.world_model import WorldModel, in_hand, part_pose, tool_pose
 from armwright.spatial.poses import inverse
+from armwright.spatial.shapes import centroid
 
 # How long a held part may be off the pads, and an arm off its track [s].
 _LOST, _OFF_TRACK = 0.05, 0.02
@@ -25,6 +26,7 @@ _LOST, _OFF_TRACK = 0.05, 0.02
 _LOOK, _PAUSE = 0.01, 0.1
 # How long an arm is left alone that has had a mishap [s]: it brakes.
 _STOP = 0.2
+_NO_CONTACT = PeakContact(0.0, 0.0)
 
 
 @attrs.define(eq=False)
@@ -44,6 +46,7 @@ class Hand:
         stopping_until: tick up to which the arm is stopped because of a mishap, and others are no news.
         quiet_until: tick up to which contacts are no news.
         deepest: how deep the arm has pressed into the plane since its motion began [m].
+        hardest: how hard it has pressed on anything else since then, if the program looks out for contact.
     """
 
     drive: GripperDrive
@@ -58,6 +61,7 @@ class Hand:
     stopping_until: int = 0
     quiet_until: int = 0
     deepest: float = 0.0
+    hardest: PeakContact = _NO_CONTACT
 
     def copy(self) -> Hand:
         """Return a hand in the same state."""
@@ -93,7 +97,7 @@ class Watch:
             # What it pressed on while it was guarded, it may press on until it is away.
             quiet = tick + (round(_PAUSE / self._cell.period) if hand.guarded else 0)
             hand.quiet_until = max(hand.quiet_until, quiet)
-        hand.guarded, hand.deepest = guarded, 0.0
+        hand.guarded, hand.deepest, hand.hardest = guarded, 0.0, _NO_CONTACT
 
     def close(self, arm: str, closed_tick: int, expected: str | None) -> None:
         """Take note that a gripper will have closed at a tick, on a part if the program says on which."""
@@ -120,8 +124,27 @@ class Watch:
         part = self.hands[arm].part
         return self._cell.parts[part].mass if part is not None and self._cell.arms[arm].servo.knows_parts else 0.0
 
+    def known_wrench(self, data: Any, arm: str) -> Array:
+        """Return the wrench (6,) of the weight of the part that an arm holds, as its controller knows the part.
+
+        Force [N] and moment about the tool point [N m], along the axes of the world.
+        """
+        mass, part = self.known_load(arm), self.hands[arm].part
+        if not mass or part is None:
+            return np.zeros(6)
+        known = self._cell.parts[part]
+        # As the program believes that it holds the part: by its grasp frame.
+        lever = tool_pose(data, arm)[:3, :3] @ known.grasp[:3, :3].T @ (centroid(known.shape) - known.grasp[:3, 3])
+        weight = mass * self._cell.gravity
+        return np.concatenate([weight, np.cross(lever, weight)])
+
     def peak_contact(self, arm: str) -> PeakContact:
-        """Return the deepest contact of an arm with the plane since its latest motion began."""
+        """Return the hardest contact of an arm since its latest motion began: with the plane, if there is one.
+
+        Without a plane only contacts that the program looks out for count.
+        """
+        if not self._world.plate:
+            return self.hands[arm].hardest
         depth = self.hands[arm].deepest
         return PeakContact(depth, depth * self._cell.contact.stiffness)
 
@@ -212,7 +235,11 @@ class Watch:
             hand.quiet_until = tick + quiet
             if news:
                 return mishaps.touched(now, touch)
-        if self._world.plate:
+        if not self._world.plate:
+            for name, hand in self.hands.items():
+                if hand.guarded:
+                    hand.hardest = max(hand.hardest, self._contacts.pressed(data, name), key=lambda it: it.force)
+        else:
             depth = self._contacts.plate_depth(data)
             for name, hand in self.hands.items():
                 if hand.guarded and depth > hand.deepest:

@@ -20,28 +20,30 @@ from armwright.cell.hardware import DeviceError, Mishap, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartPoses
-from armwright.cell.scene import Part, Spread
+from armwright.cell.scene import Part
 from armwright.cell.simulator import Simulator
-from armwright.errors import InvalidValueError, closest
+from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics import mishaps
 from armwright.physics.contacts import Contacts
+from armwright.physics.draws import drawn_frames, drawn_parts, placed_fixtures
 from armwright.physics.measured import Log
 from armwright.physics.pictures import Photographer, png
 from armwright.physics.plant import arm_indices
 from armwright.physics.seeing import target_of
 from armwright.physics.servo import ArmServo, Measured, Sent, TorqueLaw
+from armwright.physics.start import buried_bases, check_arguments
 from armwright.physics.vision import camera_in_world, look
 from armwright.physics.watch import Watch
 from armwright.physics.world_model import WorldModel, part_pose, part_velocity, world_model
-from armwright.spatial.poses import homogeneous, inverse, to_noap
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.physics.wrist_sensor import WristSensor
+from armwright.spatial.poses import inverse, to_noap
 
 # A time so little before a tick is on it.
 _TICK_TOLERANCE = 1e-6
-# Of very many pictures the last ones are kept.
-_MAX_PICTURES = 500
+# Of very many pictures the last ones are kept, and of large ones those of so many bytes together.
+_MAX_PICTURES, _MAX_PICTURE_BYTES = 500, 200_000_000
 # So are they of very many mishaps.
 _MAX_MISHAPS = 1000
 # Ticks between poses of the tool that are compared.
@@ -58,6 +60,7 @@ class PhysicsCell:
         seed: int = 0,
         laws: Mapping[str, TorqueLaw] | None = None,
         parts: Mapping[str, Part] | None = None,
+        frames: Mapping[str, Array] | None = None,
     ) -> None:
         """Set up the initial state.
 
@@ -66,25 +69,29 @@ class PhysicsCell:
             seed: what is random is drawn from it: where parts stand, and the noise of sensors and cameras.
             laws: controllers of arms by name, instead of the servos of the cell.
             parts: as they are in this world; drawn from their spreads where they are left out.
+            frames: (4, 4) where the frames of the cell are in this world; drawn likewise. Programs know nothing of it.
 
         Raises:
+            KindError: an argument is of another kind.
             UnsupportedArmError: masses of an arm are unknown.
             InvalidValueError: things stand inside each other at the start, a camera looks for a part without a marker,
-                or a law is for no arm of the cell.
+                a law is for no arm of the cell, or the parts are not those of the cell.
             MissingExtraError: a camera takes pictures, and OpenCV is missing.
         """
+        check_arguments(cell, seed, laws, parts)
         for sight in cell.sights.values():
             if sight.camera is not None:
                 target_of(cell, sight)
         self._cell, self._believed = cell, Simulator(cell)
         self._seed, self._rng = seed, np.random.default_rng(seed)
-        self._world = world_model(cell, drawn_parts(cell, self._rng) if parts is None else parts)
+        parts = drawn_parts(cell, self._rng) if parts is None else parts
+        self._frames = drawn_frames(cell, self._rng) if frames is None else frames
+        self._world = world_model(attrs.evolve(cell, fixtures=placed_fixtures(cell, self._frames)), parts)
         self._contacts = Contacts(self._world)
         self._data = _initial_data(self._world)
         model, period = self._world.model, cell.period
         self._watch = Watch(cell, self._world, self._contacts)
         self._servos, self._sent = {}, {}
-        laws = dict(laws or {})
         for name, arm in cell.arms.items():
             self._servos[name] = ArmServo(
                 arm.arm,
@@ -93,23 +100,18 @@ class PhysicsCell:
                 arm.servo,
                 arm.sensors,
                 period,
-                laws.pop(name, None),
+                (laws or {}).get(name),
             )
             self._servos[name].start(self._data)
             self._watch.hands[name].drive.start(self._data)
-            self._sent[name] = Sent(hold(arm.start, 0.0), 0, period)
-        for name in laws:
-            near = closest(name, cell.arms)
-            hint = f"; did you mean {near}?" if near else ""
-            raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
+            self._sent[name] = Sent(hold(arm.start, 0.0), 0, period, self._servos[name].friction)
         self._tick = 0
         self._log = Log(cell, self._world)
         self._pictures: tuple[Picture, ...] = ()
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
         self._photographers: list[Photographer] = []
-        # The latest readings of sensors of forces, with their numbers.
-        self._forces: dict[str, tuple[int, Array]] = {}
+        self._wrists = {name: WristSensor(arm.force_sensor) for name, arm in cell.arms.items()}
         self._settle()
 
     def _settle(self) -> None:
@@ -118,6 +120,7 @@ class PhysicsCell:
 
         mujoco.mj_forward(self._world.model, self._data)
         overlaps = self._contacts.overlaps(self._data)
+        overlaps += buried_bases(self._world.cell)
         if overlaps:
             worst = max(overlaps, key=lambda overlap: overlap.depth)
             raise InvalidValueError(
@@ -135,7 +138,7 @@ class PhysicsCell:
         mujoco.mj_copyData(other._data, self._world.model, self._data)
         other._servos = {name: servo.copy() for name, servo in self._servos.items()}
         other._sent = dict(self._sent)
-        other._forces = dict(self._forces)
+        other._wrists = {name: wrist.copy() for name, wrist in self._wrists.items()}
         other._log, other._rng = self._log.copy(), np.random.default_rng()
         other._rng.bit_generator.state = self._rng.bit_generator.state
         other._contacts = copy.copy(self._contacts)
@@ -161,35 +164,36 @@ class PhysicsCell:
 
     def _step(self) -> Mishap | None:
         """Let one period of the servo go by; return that this cannot be, if numbers without meaning come to a servo."""
-        import mujoco  # noqa: PLC0415 - only cells with physics need it
-
         data = self._data
         for name, servo in self._servos.items():
             reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load = self._watch.known_load(name)
+            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
             try:
                 measured = servo.drive(data, self.now, reference)
             except InvalidValueError:
                 if np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all():
                     raise
+                # Time goes by, but nothing happens any more.
+                self._tick += 1
                 return mishaps.unstable(self.now)
             drive.step(data)
             noise = self._cell.arms[name].sensors.effort_noise
             if noise:
                 measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
             self._log.add(name, self._tick, reference, measured, drive.opening(data))
-        mujoco.mj_step(self._world.model, data, self._world.substeps)
-        self._tick += 1
+        self._world.step(data)
+        # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
+        self._tick += 1
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------
 
     def configuration(self, arm: str, now: float) -> Array:
-        """Return the joint positions (n,) of an arm: as they are now, as they are sent at a time to come."""
+        """Return the joint positions (n,) of an arm: as its sensors read them, as they are sent at a time to come."""
         if now > self.now + self._cell.period * _TICK_TOLERANCE:
             return self.sent_configuration(arm, now)
-        return np.array(self._data.qpos[self._servos[arm].indices.positions])
+        return self._servos[arm].configuration(self._data)
 
     def sent_configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that an arm is sent to, now or at a time to come."""
@@ -198,7 +202,8 @@ class PhysicsCell:
     def start_motion(self, arm: str, trajectory: Trajectory, now: float, tip: Array, *, guarded: bool = False) -> None:
         """Let an arm follow a trajectory that begins where it has been sent."""
         self._believed.start_motion(arm, trajectory, now, tip, guarded=guarded)
-        self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period)
+        friction = self._servos[arm].friction
+        self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period, friction)
         self._watch.start_motion(arm, self._tick, guarded=guarded)
 
     def contact_time(self, arm: str) -> None:
@@ -211,17 +216,17 @@ class PhysicsCell:
         """Return the deepest contact of an arm with the plane since its latest motion began."""
         return self._watch.peak_contact(arm)
 
-    def contact_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
-        """Return the force (3,) on the tool of an arm and what it holds, as its sensor reads it [N]."""
-        sensor = self._cell.arms[arm].force_sensor
-        reading = math.floor(self.now * sensor.rate + _TICK_TOLERANCE) if sensor.rate else self._tick
-        if arm in self._forces and self._forces[arm][0] == reading:
-            return self._forces[arm][1]
-        force = self._contacts.tool_force(self._data, arm) + sensor.bias
-        if sensor.noise:
-            force = force + self._rng.normal(scale=sensor.noise, size=3)
-        self._forces[arm] = (reading, np.asarray(force))
-        return self._forces[arm][1]
+    def contact_wrench(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Return the wrench (6,) on the tool of an arm and what it holds, as its sensor reads it [N] and [N m]."""
+        return self._wrists[arm].read(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def zero_force(self, arm: str, now: float) -> Array:  # noqa: ARG002 - it is now
+        """Let what the sensor of an arm reads count as zero from now on; return it (6,)."""
+        return self._wrists[arm].zero(self._tick, self.now, lambda: self._true_wrench(arm), self._rng)
+
+    def _true_wrench(self, arm: str) -> Array:
+        """Return the wrench (6,) on a tool and what it holds, without the weights that the controller knows."""
+        return self._contacts.tool_wrench(self._data, arm) - self._watch.known_wrench(self._data, arm)
 
     def tool_wrenches(self, arm: str, now: float) -> Array:  # noqa: ARG002 - nobody knows beforehand
         """Return no wrenches (1, 6): planned efforts are those of free motion."""
@@ -283,6 +288,11 @@ class PhysicsCell:
         Raises:
             DeviceError: it is not found.
         """
+        import mujoco  # noqa: PLC0415 - only cells with physics need it
+
+        # A step leaves the poses of its beginning: those of its end belong to what the arms read.
+        mujoco.mj_kinematics(self._world.model, self._data)
+        mujoco.mj_camlight(self._world.model, self._data)
         if not self._photographers:
             self._photographers.append(Photographer(self._world.model, self._cell.cameras))
         carrier = self._cell.cameras[camera].on
@@ -294,7 +304,7 @@ class PhysicsCell:
         taken = Picture(
             time=self.now, camera=camera, frame=frame, png=png(seen.picture), found=seen.pose is not None, text=text
         )
-        self._pictures = (*self._pictures, taken)[-_MAX_PICTURES:]
+        self._pictures = _latest((*self._pictures, taken))
         if seen.pose is None:
             raise DeviceError(seen.message)
         return seen.pose
@@ -304,13 +314,18 @@ class PhysicsCell:
     def measured(self, arm: str, time: float) -> Measured:
         """Return what the servo of an arm measured and did at a time [s] that has gone by; at rest before the first."""
         if not self._tick:
-            rest = np.zeros(self._cell.arms[arm].arm.n)
-            return Measured(self.configuration(arm, 0.0), rest, rest)
+            q = self.configuration(arm, 0.0)
+            rest = np.zeros_like(q)
+            return Measured(q, rest, rest, q)
         return self._log.at(arm, round(time / self._cell.period))
 
     def true_pose(self, part: str) -> Array:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)
+
+    def true_frame(self, frame: str) -> Array:
+        """Return the pose (4, 4) of a frame of the cell in the world, which is not where programs believe it."""
+        return self._frames[frame]
 
     def speed(self, part: str) -> tuple[float, float]:
         """Return how fast a part moves [m/s] and turns [rad/s]."""
@@ -341,24 +356,18 @@ class PhysicsCell:
             },
             "tip": {stream.arm: _tip_error(self._cell, stream) for stream in measured},
             "slip": {name: hand.slip for name, hand in self._watch.hands.items()},
+            "frames": {name: to_noap(self.true_frame(name)).tolist() for name in self._cell.spreads},
             "parts": {name: to_noap(self.true_pose(name)).tolist() for name in self._world.parts},
         }
         return Observations(parts=self._log.tracks(), measured=measured, pictures=self._pictures, facts=facts)
 
 
-def drawn_parts(cell: Cell, rng: np.random.Generator) -> dict[str, Part]:
-    """Return the parts of a cell where they stand in a world: each drawn from its spread."""
-    parts = {}
-    for name, part in cell.parts.items():
-        parts[name] = attrs.evolve(part, pose=drawn_pose(part.pose, part.spread, rng))
-    return parts
-
-
-def drawn_pose(X: Array, spread: Spread, rng: np.random.Generator) -> Array:
-    """Return a pose (4, 4) in the world near another one."""
-    x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (spread.position, spread.position, spread.yaw)
-    turned = rotation_from_vector(np.array([0.0, 0.0, yaw])) @ X[:3, :3]
-    return homogeneous(turned, X[:3, 3] + (x, y, 0.0))
+def _latest(pictures: tuple[Picture, ...]) -> tuple[Picture, ...]:
+    """Return the last pictures, as many as are kept."""
+    pictures = pictures[-_MAX_PICTURES:]
+    while sum(len(picture.png) for picture in pictures) > _MAX_PICTURE_BYTES:
+        pictures = pictures[1:]
+    return pictures
 
 
 def _initial_data(world: WorldModel) -> Any:
@@ -376,9 +385,14 @@ def _initial_data(world: WorldModel) -> Any:
 
 
 def _tip_error(cell: Cell, stream: MeasuredStream) -> float:
-    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m]."""
-    arm = cell.arms[stream.arm].arm
-    sent, there = (forward(arm, q[::_TIP_TICKS])[:, :3, 3] for q in (stream.sent, stream.q))
+    """Return how far the tool of an arm was from where it was sent at most, at every tenth tick [m].
+
+    The tool is where the arm of the world has it, whatever the sensors read; where it was sent is what the controller
+    believes.
+    """
+    arm = cell.arms[stream.arm]
+    sent = forward(arm.arm, stream.sent[::_TIP_TICKS])[:, :3, 3]
+    there = forward(arm.plant or arm.arm, stream.actual[::_TIP_TICKS])[:, :3, 3]
     return float(np.linalg.norm(sent - there, axis=1).max(initial=0.0))
 
 

@@ -11,19 +11,23 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.scene import Part
+from armwright.cell.scene import USUAL_CONTACT_TIME, Part
+from armwright.mujoco_library import load_mujoco
 from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.geoms import add_geom, place, quaternion
+from armwright.physics.friction import SpeedFriction
+from armwright.physics.geoms import add_geom, placement, principal_inertia, quaternion
 from armwright.physics.gripper import add_gripper, grip
 from armwright.physics.markers import add_marker
 from armwright.physics.pictures import add_camera, add_lights
-from armwright.physics.plant import PlantArm, add_arm, finish, new_world
+from armwright.physics.plant import PlantArm, add_arm, arm_indices, finish, new_world
 from armwright.physics.vision import marker_name
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Solid, centroid, convex_solids, farthest, inertia
 
 # No step of the world is longer [s].
 _MAX_STEP = 1e-3
+# Parts slower than this are at rest [m/s]: with less care they would stop before they have settled.
+_AT_REST = 1e-6
 # What meets what: bits of geoms. Arms have one each, from the third on.
 _STANDING, _PART = 1, 2
 _HAND = 1 << 30
@@ -32,8 +36,6 @@ _MAX_ARMS = 28
 # Contacts of parts and furniture: sliding, turning, rolling.
 _ROLLING = (0.005, 1e-4)
 _CONDIM = 4
-# Time constant of contacts with what stands [s].
-_SOFT = 0.02
 # How far below everything that stands the floor lies on which lost parts fall, and its half size [m].
 _BELOW, _FLOOR = 0.5, 20.0
 # The plate under a plane that yields: light, so that it adds nothing to what presses on it [kg], and damped.
@@ -55,6 +57,7 @@ class WorldModel:
         cell: what it is the world of.
         model: the MjModel.
         substeps: of the world in one period of the servo.
+        frictions: of arms whose friction changes with the speed.
         parts: the parts as they are in it.
         plate: whether a plane that yields is in it.
     """
@@ -62,8 +65,21 @@ class WorldModel:
     cell: Cell
     model: Any
     substeps: int
+    frictions: tuple[SpeedFriction, ...]
     parts: Mapping[str, Part]
     plate: bool
+
+    def step(self, data: Any) -> None:
+        """Let one period of the servo go by."""
+        import mujoco  # noqa: PLC0415 - loaded before; to look for it at every tick costs as much as the gripper
+
+        if not self.frictions:
+            mujoco.mj_step(self.model, data, self.substeps)
+            return
+        for _ in range(self.substeps):
+            for friction in self.frictions:
+                friction.set(self.model, data)
+            mujoco.mj_step(self.model, data)
 
 
 def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
@@ -76,10 +92,23 @@ def world_model(cell: Cell, parts: Mapping[str, Part]) -> WorldModel:
     Raises:
         UnsupportedArmError: masses of an arm are unknown.
     """
+    mujoco = load_mujoco()
     spec, plants = world_spec(cell, parts)
     substeps = round(cell.period / spec.option.timestep)
     plate = cell.contact.height is not None
-    return WorldModel(cell=cell, model=finish(spec, plants), substeps=substeps, parts=parts, plate=plate)
+    model = finish(spec, plants)
+    # Parts at rest are left out of the equations until something touches them; arms never are.
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    model.opt.sleep_tolerance = _AT_REST
+    frictions = [SpeedFriction(arm.arm, arm_indices(model, arm.name, arm.arm.n)) for arm in plants]
+    return WorldModel(
+        cell=cell,
+        model=model,
+        substeps=substeps,
+        frictions=tuple(friction for friction in frictions if friction.is_there),
+        parts=parts,
+        plate=plate,
+    )
 
 
 def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantArm, ...]]:
@@ -100,7 +129,7 @@ def world_spec(cell: Cell, parts: Mapping[str, Part]) -> tuple[Any, tuple[PlantA
         gripper = cell_arm.gripper_or_usual
         plant = add_arm(spec, name, arm, cell_arm.base, arm_bodies(name, arm, gripper), **bits)
         hand = {"contype": bit | _HAND, "conaffinity": affinity, "rgba": _GRIPPER}
-        add_gripper(spec, name, plant.tool, gripper, spec.option.timestep, **hand)
+        add_gripper(spec, name, plant.tool, gripper, **hand)
         plants.append(plant)
     _add_standing(spec, cell)
     _add_floor(spec, cell, parts)
@@ -124,23 +153,23 @@ def _surface(friction: float) -> dict[str, Any]:
     return {"friction": (friction, *_ROLLING), "condim": _CONDIM}
 
 
-def _furniture(friction: float) -> dict[str, Any]:
+def _furniture(friction: float, contact_time: float = USUAL_CONTACT_TIME) -> dict[str, Any]:
     """Return the options of what stands: softer than pads, whose own stiffness would make every touch a blow."""
-    return {**_surface(friction), "priority": 2, "solref": (_SOFT, 1.0)}
+    return {**_surface(friction), "priority": 2, "solref": (contact_time, 1.0)}
 
 
 def _add_standing(spec: Any, cell: Cell) -> None:
     for name, fixture in cell.fixtures.items():
         solid = Solid(shape=fixture.shape, pose=fixture.pose)
         bits = {"contype": _STANDING, "conaffinity": _ALL}
+        surface = _furniture(fixture.friction, fixture.contact_time)
         for label, piece in _pieces(name, solid):
-            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **_furniture(fixture.friction))
+            add_geom(spec, spec.worldbody, label, piece, rgba=_FURNITURE, **bits, **surface)
 
 
 def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
     """Add a floor on which parts fall that have been lost; nothing else meets it."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     things = [(fixture.pose, fixture.shape) for fixture in cell.fixtures.values()]
     things += [(part.pose, part.shape) for part in parts.values()]
     lowest = min([float(X[2, 3]) - farthest(shape) for X, shape in things], default=0.0)
@@ -157,7 +186,7 @@ def _add_floor(spec: Any, cell: Cell, parts: Mapping[str, Part]) -> None:
 
 
 def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
-    """Add the cameras of a cell, light, and the markers that they look for."""
+    """Add the cameras of a cell, light, and the markers that they search for."""
     if not cell.cameras:
         return
     add_lights(spec)
@@ -171,11 +200,9 @@ def _add_cameras(spec: Any, cell: Cell, tools: Mapping[str, Any]) -> None:
 
 
 def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
-    body = spec.worldbody.add_body(name=part.name, **place(part.pose))
+    body = spec.worldbody.add_body(name=part.name, **placement(part.pose))
     body.add_freejoint(name=part.name)
-    moments, axes = np.linalg.eigh(inertia(part.shape))
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
+    moments, axes = principal_inertia(inertia(part.shape))
     body.explicitinertial, body.mass, body.inertia = True, part.mass, part.mass * moments
     body.ipos, body.iquat = centroid(part.shape), quaternion(axes)
     bits = {"contype": _PART, "conaffinity": _ALL}
@@ -185,8 +212,7 @@ def _add_part(spec: Any, part: Part, colour: tuple[float, ...]) -> None:
 
 def _add_plate(spec: Any, cell: Cell) -> None:
     """Add the plane of contact of the cell, if there is one: a light plate on a spring."""
-    import mujoco  # noqa: PLC0415 - only cells with several bodies need it
-
+    mujoco = load_mujoco()
     plane = cell.contact
     if plane.height is None:
         return
@@ -209,7 +235,7 @@ def _add_plate(spec: Any, cell: Cell) -> None:
         rgba=_FURNITURE,
         contype=0,
         conaffinity=_PART | _HAND,
-        **_furniture(0.8),
+        **{**_furniture(0.8), "priority": 4},
     )
 
 
@@ -222,7 +248,7 @@ def part_pose(data: Any, name: str) -> Array:
 
 
 def part_velocity(data: Any, name: str) -> Array:
-    """Return the velocity (6,) of a part: of its origin along the axes of the world, and how it turns about its own."""
+    """Return the velocity (6,) of a part: of its origin along the axes of the world, and angular about its own axes."""
     return np.array(data.joint(name).qvel)
 
 

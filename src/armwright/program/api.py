@@ -12,10 +12,10 @@ from armwright.cell.assembly import assembly_cell, is_assembly
 from armwright.cell.hardware import Hardware, HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
-from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, KindError, counted, one_of, shown
 from armwright.files.inputs import read_program, regular_file
 from armwright.files.limits import limit, limit_message
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.assembler import assemble
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
@@ -92,7 +92,7 @@ class LoadedProgram:
     cell: Cell | None
     diagnostics: tuple[Diagnostic, ...] = ()
     imports: tuple[Path, ...] = ()
-    hardware: HardwareFactory = Simulator
+    hardware: HardwareFactory = kinematic_cell
     is_code_file: bool = False
 
 
@@ -206,7 +206,7 @@ def run(
         raise ProgramError(compiled)
     if compiled.cell is None:
         raise InvalidValueError(f"{compiled.source.name} needs a cell to run in, and IMPORTs none")
-    at_work = Simulator(compiled.cell) if hardware is None else hardware
+    at_work = kinematic_cell(compiled.cell) if hardware is None else hardware
     if callable(at_work):
         at_work = at_work(compiled.cell)
     return interpret(compiled.code, compiled.cell, at_work, progress=progress, limits=limits)

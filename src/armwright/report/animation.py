@@ -53,7 +53,8 @@ class ArmFigure:
     """The bodies of an arm, and the chain that moves them, at the M instants of the animation.
 
     Attributes:
-        q: (M, n) joint positions [rad] or [m].
+        q: (M, n) joint positions [rad] or [m], measured where they were.
+        planned: (M, n) joint positions that were planned, where others were measured; None without.
         base: (12,) columns n, o, a, p of frame 0 in the world.
         joints: n joints from base to hand.
         tool: (12,) the tool in the last frame.
@@ -69,11 +70,12 @@ class ArmFigure:
     bodies: Sequence[Body]
     grip: Array
     opening: float
+    planned: Array | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class MovedPart:
-    """A part and where it was; from each time on the pose beside it holds.
+    """A part and where it was; from each time on the pose beside it holds, or changes evenly into the next.
 
     Attributes:
         name: its name.
@@ -81,6 +83,7 @@ class MovedPart:
         times: (k,) [s], from 0.
         arms: the arm on whose hand it was; None where it was in the world.
         poses: k poses (12,), columns n, o, a, p, relative to the tool of the arm or to the world.
+        changes_evenly: whether it moved from each pose to the next one; otherwise it stays where it is until then.
     """
 
     name: str
@@ -88,6 +91,7 @@ class MovedPart:
     times: Sequence[float]
     arms: Sequence[str | None]
     poses: Sequence[Array]
+    changes_evenly: bool = False
 
 
 @attrs.frozen(kw_only=True, eq=False)

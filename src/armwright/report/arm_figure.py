@@ -12,12 +12,12 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.scene import Gripper
-from armwright.physics.cell_bodies import arm_bodies
-from armwright.physics.clearance import Body as SolidBody
+from armwright.physics.cell_bodies import Body as SolidBody, arm_bodies, has_solids
 from armwright.physics.hand_solids import gripper_length, gripper_solids
 from armwright.report.animation import ArmFigure, Body, ChainJoint
 from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import homogeneous, to_noap
+from armwright.spatial.rotations import rotation_with_z
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Sphere
 
 # Where nothing is checked for collisions, guessed links are drawn slimmer, towards the tool more so.
@@ -55,7 +55,7 @@ def arm_figure(name: str, placed: Placed, q: Array, grip: Array, shapes: ShapeTa
 
     Args:
         name: its name.
-        placed: the arm and its place.
+        placed: the arm and where it stands.
         q: (M, n) joint positions at the instants of the animation [rad] or [m].
         grip: (M,) opening of the fingers, 0 to 1.
         shapes: collects the shapes of the page.
@@ -85,7 +85,7 @@ def opening_of(placed: Placed) -> float:
 def _links(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
     arm = placed.arm
     solids = arm_bodies(name, arm, placed.gripper)
-    if any(link.solids for link in arm.links):
+    if has_solids(arm):
         for body in solids:
             yield _body(body.name, body.solid.pose, body.link, "base" if body.link == 0 else "link"), body.solid.shape
     else:
@@ -118,7 +118,7 @@ def _guessed(name: str, placed: Placed, solids: list[SolidBody]) -> Iterator[tup
         behind = _finger_length(arm) if placed.gripper is None else gripper_length(placed.gripper)
         length = max(way - behind, 0.2 * way)
         z = arm.tool[:3, 3] / way
-        pose = homogeneous(_turned_to(z), z * length / 2)
+        pose = homogeneous(rotation_with_z(z), z * length / 2)
         yield _body(f"{name} tool", pose, arm.n, "link"), Cylinder(radius=0.8 * radii[-1], length=length)
 
 
@@ -168,10 +168,3 @@ def _length(arm: Arm) -> float:
 def _finger_length(arm: Arm) -> float:
     wanted, way = _FINGER * _length(arm), float(np.linalg.norm(arm.tool[:3, 3]))
     return min(wanted, _FINGER_OF_TOOL * way) if way > 0.3 * wanted else wanted
-
-
-def _turned_to(z: Array) -> Array:
-    """Return a rotation (3, 3) whose z axis is this."""
-    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)

@@ -92,16 +92,16 @@ def _residuals_figure(calibration: CameraCalibration) -> "Figure":
 
 
 def _pictures_figure(calibration: CameraCalibration) -> "Figure":
-    found, alone = calibration.hand_eye, calibration.intrinsics
+    fit, alone = calibration.hand_eye, calibration.intrinsics
     bars = []
     if alone is not None:
         bars.append(("rms of corners, px", alone.views.names, alone.rms_by_picture, 0))
-    if found is not None:
-        bars.append(("against the arm", found.names, found.by_picture, 1))
+    if fit is not None:
+        bars.append(("against the arm", fit.names, fit.by_picture, 1))
     figure = empty_figure((7.4, 2.2 * len(bars) + 0.6))
     for axes, (label, names, values, colour) in zip(np.ravel(figure.subplots(len(bars), 1)), bars, strict=True):
-        places = [calibration.views.names.index(name) + 1 for name in names]
-        axes.bar(places, values, color=f"C{colour}")
+        numbers = [calibration.views.names.index(name) + 1 for name in names]
+        axes.bar(numbers, values, color=f"C{colour}")
         axes.set(ylabel=label, xlim=(0.4, len(calibration.views) + 0.6))
         axes.grid(visible=True, axis="y", alpha=0.3)
         if colour:

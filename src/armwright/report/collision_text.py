@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from armwright.physics.collisions import LOOKED_FOR, CheckedBodies, StageClearance
+from armwright.errors import listed
 from armwright.program.vm.recording import Recording
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import CheckedBodies, StageClearance
 
 # The text wherever a motion is reported whose collisions are not checked.
 NOT_CHECKED = "not checked"
@@ -30,6 +32,8 @@ def _least(recording: Recording) -> str:
         if run.clearance is not None and run.clearance.distance is not None
     ]
     if not near:
+        from armwright.physics.collisions import LOOKED_FOR  # noqa: PLC0415 - of cells with bodies
+
         return f"no arm comes within {LOOKED_FOR * 1e3:g} mm of another body"
     distance, run, clearance = min(near, key=lambda entry: entry[0])
     own, other = clearance.bodies
@@ -44,16 +48,11 @@ def _guesses(checked: CheckedBodies) -> list[str]:
         for arm, (largest, smallest) in checked.guessed.items()
     ]
     if checked.estimated:
-        texts.append(f"a guess: {_listed(checked.estimated)}")
+        texts.append(f"a guess: {listed(checked.estimated, _LISTED)}")
     if checked.left_out:
-        pairs = [f"{one} with {other}" for one, other in checked.left_out]
-        texts.append(f"left out, as the guess meets the other at the start: {_listed(pairs)}")
+        pairs = [f"{a} with {b}" for a, b in checked.left_out]
+        texts.append(f"left out, as the guess meets the other at the start: {listed(pairs, _LISTED)}")
     return texts
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
 
 
 def clearance_data(clearance: StageClearance | None) -> dict[str, Any] | None:
@@ -66,5 +65,5 @@ def clearance_data(clearance: StageClearance | None) -> dict[str, Any] | None:
         "bound": clearance.bound,
         "bodies": list(clearance.bodies),
         "time": clearance.time if near else None,
-        "position": list(clearance.place) if near else None,
+        "position": list(clearance.point) if near else None,
     }

@@ -239,6 +239,7 @@ class RunPage:
         clearance: smaller distances of stages are marked [m].
         text_kind: kind of the text, ``Program`` or ``Poses``.
         collisions: whether they were checked, and how near the arms came to other bodies.
+        physics: the engine with its seed, and the largest errors, in a cell with physics; empty in one without.
     """
 
     title: str
@@ -258,6 +259,7 @@ class RunPage:
     clearance: float = 0.0
     text_kind: Literal["Program", "Poses"] = "Program"
     collisions: str = NOT_CHECKED
+    physics: str = ""
 
 
 def run_page(data: RunPage) -> str:
@@ -288,5 +290,7 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.cell_name:
         yield "Cell", data.cell_name
     yield data.text_kind, data.program_name
+    if data.physics:
+        yield "Physics", data.physics
     yield "Collisions", data.collisions
     yield "Command", data.command

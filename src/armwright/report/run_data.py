@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import base_name
+from armwright.cell.observations import MeasuredStream
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
@@ -22,7 +23,7 @@ from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, Run
 from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
-from armwright.report.tracking import measured_motion, seen_pictures
+from armwright.report.tracking import measured_motion, nearest_ticks, physics_text, seen_pictures
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
@@ -75,9 +76,16 @@ def run_page_data(
         arms=_arm_records(recording),
         animation=animation,
         collisions=collision_text(recording),
+        physics=_physics(recording),
         pictures=pictures,
         clearance=cell.clearance,
     )
+
+
+def _physics(recording: Recording) -> str:
+    """Return engine, seed and largest errors of a run in a cell with physics; nothing of another one."""
+    facts = recording.observations.facts
+    return f"{facts['engine']} {facts['version']}, seed {facts['seed']}; {physics_text(recording)}" if facts else ""
 
 
 def _arm_records(recording: Recording) -> list[ArmRecord]:
@@ -142,7 +150,9 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms, tree = recording.cell.arms, recording.tree
-    q = {s.arm: _configurations_at(s, t) for s in recording.streams}
+    planned = {s.arm: _rows_at(s, t) for s in recording.streams}
+    measured = {s.arm: _rows_at(s, t) for s in recording.measured if len(s.t)}
+    q = planned | measured
     tool_poses = {name: arms[name].base @ forward(arms[name].arm, rows) for name, rows in q.items()}
     hidden = {WORLD, *arms, *map(base_name, arms)}
     visible = [name for name in tree if name not in hidden and tree.has_value(name)]
@@ -151,7 +161,10 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     shapes = ShapeTable()
     placed = placed_arms(recording.cell)
     figures = {
-        name: arm_figure(name, placed[name], rows, finger_opening(recording, name, t, opening_of(placed[name])), shapes)
+        name: attrs.evolve(
+            arm_figure(name, placed[name], rows, finger_opening(recording, name, t, opening_of(placed[name])), shapes),
+            planned=planned[name] if name in measured else None,
+        )
         for name, rows in q.items()
     }
     fixtures, parts = fixture_bodies(recording.cell, shapes), moved_parts(recording, shapes)
@@ -174,9 +187,9 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     return animation, [*fewer_frames, *fewer_changes, *fewer]
 
 
-def _configurations_at(stream: Stream, t: Array) -> Array:
-    period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
-    return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
+def _rows_at(stream: Stream | MeasuredStream, t: Array) -> Array:
+    """Return the joint positions of a stream at its ticks next to some instants."""
+    return np.asarray(stream.q[nearest_ticks(stream.t, t)])
 
 
 def _frame_tracks(

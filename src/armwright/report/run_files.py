@@ -316,10 +316,14 @@ def run_record(recording: Recording, diagnostics: Sequence[Diagnostic], origin: 
     }
 
 
-def input_hashes(origin: RunInputs) -> list[str | None]:
-    """Return the SHA-256 hashes of program, cell and imports, to tell whether they are as they were."""
-    paths = [origin.program, *([] if origin.cell is None else [origin.cell]), *origin.imports]
-    return [_file_record(path)["sha256"] for path in paths]
+def input_hashes(origin: RunInputs) -> dict[str, str | None]:
+    """Return the SHA-256 hashes of program, cell and imports, by what they are, to tell whether they are as before."""
+    paths = {
+        "program": origin.program,
+        **({} if origin.cell is None else {"cell": origin.cell}),
+        **{f"import {number}": path for number, path in enumerate(origin.imports, 1)},
+    }
+    return {name: _file_record(path)["sha256"] for name, path in paths.items()}
 
 
 def _file_record(path: Path, text: str | None = None) -> dict[str, str | None]:

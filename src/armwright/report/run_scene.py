@@ -9,14 +9,15 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
-from armwright.cell.part_poses import PartTrack
+from armwright.cell.part_poses import PartTrack, width_across
 from armwright.cell.scene import Fixture
 from armwright.program.vm.recording import Effect, Recording
 from armwright.report.animation import Body, MovedPart
 from armwright.report.arm_figure import Placed
 from armwright.report.shape_table import ShapeTable, shape_data
+from armwright.report.tracking import nearest_ticks
 from armwright.spatial.poses import to_noap
-from armwright.spatial.shapes import Box, support
+from armwright.spatial.shapes import Box
 
 # Bodies of the scene that the view draws at most, and as many parts.
 MAX_BODIES = 400
@@ -32,14 +33,13 @@ def placed_arms(cell: Cell) -> dict[str, Placed]:
 
     Their guessed links are drawn as they are checked for collisions, wherever there is anything to collide with.
     """
-    checked = bool(cell.fixtures or cell.parts) or len(cell.arms) > 1
     return {
         name: Placed(
             arm=arm.arm,
             base=arm.base,
             floor=_floor_below((arm.base @ arm.arm.base)[:3, 3], cell.fixtures),
             gripper=arm.gripper,
-            as_checked=checked,
+            as_checked=cell.collisions_matter,
         )
         for name, arm in cell.arms.items()
     }
@@ -66,7 +66,10 @@ def fixture_bodies(cell: Cell, shapes: ShapeTable) -> list[Body]:
 
 
 def moved_parts(recording: Recording, shapes: ShapeTable) -> list[MovedPart]:
-    """Return the parts and where they were, as the view draws them."""
+    """Return the parts and where they were, as the view draws them.
+
+    In a cell with physics they are followed all the time; otherwise only events change what is known of them.
+    """
     tracks = list(part_tracks(recording).items())[:MAX_BODIES]
     most = _MAX_POSES // max(len(tracks), 1)
     return [
@@ -76,6 +79,7 @@ def moved_parts(recording: Recording, shapes: ShapeTable) -> list[MovedPart]:
             times=[float(track.times[i]) for i in kept],
             arms=[track.arms[i] for i in kept],
             poses=[to_noap(track.poses[i]) for i in kept],
+            changes_evenly=bool(recording.measured),
         )
         for name, track in tracks
         if (kept := kept_poses(track, most))
@@ -93,7 +97,8 @@ def part_tracks(recording: Recording) -> dict[str, PartTrack]:
 def kept_poses(track: PartTrack, most: int) -> list[int]:
     """Return the numbers of the poses of a track that a page shows.
 
-    A change of the arm is always kept, and so is the last pose; of the others those that differ, and so many at most.
+    A change of the arm is always kept, and so is the last pose; of the others those that differ, each with the one
+    before it, up to which the part stood still, and so many at most.
 
     Args:
         track: of a part.
@@ -104,7 +109,10 @@ def kept_poses(track: PartTrack, most: int) -> list[int]:
     kept, last = set(changes), 0
     moved = []
     for i in range(1, count):
-        if i in kept or np.abs(track.poses[i] - track.poses[last]).max() > _STILL:
+        has_moved = np.abs(track.poses[i] - track.poses[last]).max() > _STILL
+        if has_moved and last < i - 1:
+            moved.append(i - 1)
+        if has_moved or i in kept:
             last = i
             if i not in kept:
                 moved.append(i)
@@ -113,9 +121,9 @@ def kept_poses(track: PartTrack, most: int) -> list[int]:
 
 
 def finger_opening(recording: Recording, arm: str, t: Array, opening: float) -> Array:
-    """Return the opening of the fingers at each instant, 0 to 1; they are closed at the start.
+    """Return the opening of the fingers at each instant, 0 to 1: as it was measured, where there are fingers.
 
-    Fingers that close on a part stop at its sides.
+    Otherwise they are closed at the start, and fingers that close on a part stop at its sides.
 
     Args:
         recording: of the run.
@@ -123,6 +131,10 @@ def finger_opening(recording: Recording, arm: str, t: Array, opening: float) -> 
         t: (M,) instants [s].
         opening: distance between the open fingers [m].
     """
+    measured = {stream.arm: stream for stream in recording.measured if len(stream.t)}
+    if arm in measured and recording.cell.arms[arm].gripper_or_usual.kind == "fingers":
+        stream = measured[arm]
+        return np.asarray(np.clip(stream.opening[nearest_ticks(stream.t, t)] / opening, 0.0, 1.0))
     tracks = part_tracks(recording)
     times, values = [0.0], [0.0]
     for effect in recording.effects:
@@ -139,10 +151,8 @@ def _held_width(recording: Recording, tracks: Mapping[str, PartTrack], grasp: Ef
     for name, track in tracks.items():
         i = int(np.searchsorted(track.times, grasp.t1 + 1e-9, side="right")) - 1
         if i >= 0 and track.arms[i] == grasp.arm:
-            shape, X = recording.cell.parts[name].shape, track.poses[i]
-            o = X[:3, :3].T[:, 1]
-            widths.append(2 * max(X[1, 3] + support(shape, o), support(shape, -o) - X[1, 3]))
-    return float(max(widths))
+            widths.append(width_across(recording.cell.parts[name].shape, track.poses[i]))
+    return max(widths)
 
 
 def scene_data(cell: Cell) -> list[dict[str, Any]]:

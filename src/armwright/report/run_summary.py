@@ -1,6 +1,6 @@
 """The summary of a run: its trace, its stages, and where the frames were when it failed."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
@@ -16,6 +16,7 @@ from armwright.program.vm.move_diagnostics import path_text
 from armwright.program.vm.recording import Effect, Recording, RunStage
 from armwright.report.collision_text import collision_text
 from armwright.report.run_files import ending_data, summary_data
+from armwright.report.tracking import physics_text
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -62,7 +63,7 @@ class RunSummary:
         return (
             *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
             numbers,
-            *physics_note(recording),
+            *([text] if (text := physics_text(recording)) else []),
             collisions,
         )
 
@@ -137,16 +138,3 @@ def frame_table(error: RunError, code: Code) -> ResultTable:
         rows=frames.map(row).join(omitted),
         numbers=(2,),
     )
-
-
-def physics_note(recording: Recording) -> tuple[str, ...]:
-    """Return how well arms and hands did in a cell with physics; nothing of one without."""
-    facts = recording.observations.facts
-    if not facts:
-        return ()
-    tips, slips = facts["tip"], facts["slip"]
-    assert isinstance(tips, Mapping)  # noqa: S101 - of a cell with physics
-    assert isinstance(slips, Mapping)  # noqa: S101
-    arms = [f"{arm}: tip within {tip * 1e3:.2g} mm of where it was sent" for arm, tip in tips.items()]
-    held = [f", parts within {slip * 1e3:.2g} mm in the hand" if slip else "" for slip in slips.values()]
-    return ("; ".join(arm + hand for arm, hand in zip(arms, held, strict=True)),)

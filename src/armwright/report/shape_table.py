@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import attrs
 import numpy as np
 import numpy.typing as npt
 
@@ -62,18 +63,12 @@ def shape_data(shape: Shape, triangles: int = _TRIANGLES) -> dict[str, Any]:
     }
 
 
-def _lengths(shape: Shape) -> dict[str, Any]:
-    match shape:
-        case Box(size=size):
-            return {"kind": "box", "size": _rounded(size)}
-        case Cylinder(radius=radius, length=length):
-            return {"kind": "cylinder", "radius": round(radius, _DECIMALS), "length": round(length, _DECIMALS)}
-        case Capsule(radius=radius, length=length):
-            return {"kind": "capsule", "radius": round(radius, _DECIMALS), "length": round(length, _DECIMALS)}
-        case Sphere(radius=radius):
-            return {"kind": "sphere", "radius": round(radius, _DECIMALS)}
-        case Mesh():
-            raise AssertionError("a mesh has no lengths")
+def _lengths(shape: Box | Cylinder | Capsule | Sphere) -> dict[str, Any]:
+    lengths = attrs.asdict(shape, recurse=False)
+    return {
+        "kind": type(shape).__name__.lower(),
+        **{name: _rounded(x) if isinstance(x, np.ndarray) else round(x, _DECIMALS) for name, x in lengths.items()},
+    }
 
 
 def coarse_mesh(mesh: Mesh, most: int) -> tuple[Array, npt.NDArray[np.int32]]:

@@ -1,21 +1,23 @@
-"""What was measured in a run, beside what was planned, for its page: motions and pictures."""
+"""What was measured in a run, beside what was planned: motions, pictures, and the largest errors in words."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.cell.observations import MeasuredStream, Picture
-from armwright.program.vm.recording import Stream
+from armwright.program.vm.recording import Recording, Stream
 from armwright.report.page import MeasuredMotion, SeenPicture
 from armwright.report.stick_figure import thinned_rows
 
 # Pictures of a page at most, and their bytes together.
 _MAX_PICTURES, _MAX_BYTES = 60, 6_000_000
+# Nobody is told of less [mm].
+_LEAST = 1e-3
 
 
 def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion | None:
@@ -39,6 +41,12 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
         worst=sizes.max(axis=0),
         worst_t=measured.t[sizes.argmax(axis=0)],
     )
+
+
+def nearest_ticks(ticks: Array, t: Array) -> npt.NDArray[np.intp]:
+    """Return the numbers of the evenly spaced ticks (k,) next to some instants, the last one behind the end."""
+    period = ticks[1] - ticks[0] if len(ticks) > 1 else 1.0
+    return np.clip(np.round(t / period).astype(np.intp), 0, len(ticks) - 1)
 
 
 def tracking_error(planned: Stream, measured: MeasuredStream) -> Array:
@@ -73,3 +81,20 @@ def seen_pictures(pictures: Sequence[Picture]) -> tuple[list[SeenPicture], list[
         )
     omitted = f"this page shows the first {len(shown)} of {len(pictures):,} pictures; all in the files seen-*.png"
     return shown, [omitted] if len(shown) < len(pictures) else []
+
+
+def physics_text(recording: Recording) -> str:
+    """Return how well arms and hands did in a cell with physics; nothing of one without."""
+    facts = recording.observations.facts
+    if not facts:
+        return ""
+    tips, slips = facts["tip"], facts["slip"]
+    assert isinstance(tips, Mapping)  # noqa: S101 - of a cell with physics
+    assert isinstance(slips, Mapping)  # noqa: S101
+    arms = [f"{arm}: tip within {_millimetres(tip)} of where it was sent" for arm, tip in tips.items()]
+    held = [f", parts within {_millimetres(slip)} in the hand" if slip else "" for slip in slips.values()]
+    return "; ".join(arm + hand for arm, hand in zip(arms, held, strict=True))
+
+
+def _millimetres(length: float) -> str:
+    return f"{max(length * 1e3, _LEAST):.2g} mm"

@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.errors import counted
 from armwright.files.result_table import ResultTable
 from armwright.program.vm.trials import SEPARATOR
 
@@ -28,7 +29,7 @@ class Trial(NamedTuple):
         cause: why it failed; empty where it succeeded.
         message: the cause in words.
         distance: of the part that is farthest from its goal [m]; not a number where nothing is known of that.
-        angle: of the part that is turned most from its goal [rad].
+        angle: of the part that is rotated farthest from its goal [rad].
         duration: until the program ended [s].
         ended: whether the program came to its end.
     """
@@ -128,9 +129,10 @@ class TrialsSummary:
         if self.distances.size:
             middle, most = _quantiles(self.distances * 1e3)
             turned, most_turned = _quantiles(np.degrees(self.angles))
+            ended = counted(len(self.distances), "trial")
             rows.append(
-                f"placing error: {middle:.3g} mm in the median, {most:.3g} mm in 95 %; "
-                f"{turned:.3g} and {most_turned:.3g} deg"
+                f"largest placing errors of a part, in the {ended} whose program came to its end: "
+                f"median {middle:.3g} mm and {turned:.3g} deg, 95 % below {most:.3g} mm and {most_turned:.3g} deg"
             )
         if self.failures:
             number = self.failures[0].number
@@ -167,6 +169,17 @@ class TrialsSummary:
             "errors_deg": _spread(np.degrees(self.angles)),
             "histogram": {"edges_mm": (edges * 1e3).tolist(), "counts": counts.tolist()},
             "duration": _spread(np.array(durations)),
+            "each": [
+                {
+                    "trial": it.number,
+                    "cause": it.cause or None,
+                    "ended": it.ended,
+                    "error_mm": _known(it.distance * 1e3),
+                    "error_deg": _known(math.degrees(it.angle)),
+                    "duration_s": _known(it.duration),
+                }
+                for it in self.trials
+            ],
         }
 
     def tables(self) -> Iterator[ResultTable]:
@@ -202,6 +215,11 @@ def _spread(values: Array) -> dict[str, float | None]:
         return {"median": None, "p95": None, "largest": None}
     middle, most = _quantiles(values)
     return {"median": middle, "p95": most, "largest": float(values.max())}
+
+
+def _known(value: float) -> float | None:
+    """Return a number that JSON can hold; None where nothing is known."""
+    return value if math.isfinite(value) else None
 
 
 def _listed(numbers: tuple[int, ...]) -> str:

@@ -11,9 +11,10 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.drives import coulomb_friction
+from armwright.dynamics.drives import friction_law
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares
+from armwright.dynamics.springs import with_springs
 from armwright.errors import InvalidValueError
 
 # Where the arm should be: (n,) positions at a time, or their derivative of an order 1 or 2. A trajectory is one.
@@ -50,7 +51,7 @@ def no_effort(arm: Arm) -> Controller:
 
 
 def gravity_compensation(arm: Arm) -> Controller:
-    """Return a controller that carries the weight of the arm and does nothing else."""
+    """Return a controller that carries the weight of the arm and holds its springs, and does nothing else."""
     weighed(arm)
     return lambda _t, q, _qd: np.array(gravity_shares(arm, q.tolist()))
 
@@ -95,7 +96,8 @@ def pd_with_gravity(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike) -> Controller:
     """Return a controller that makes the arm n separate double integrators and steers those.
 
-    Rotors and viscous friction count. Dry friction is overcome in the direction in which the reference moves.
+    Rotors, springs and viscous friction count. Other friction is overcome as the reference moves: compensated by the
+    measured speed, it would push a joint at rest to and fro.
 
     Args:
         arm: the arm as the controller knows it, with n joints.
@@ -112,13 +114,14 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
         section 8.3.
     """
     stiffness, damping = _gains(arm, kp, "kp"), _gains(arm, kd, "kd")
-    inertia, viscous = arm.motor_values("inertia"), arm.motor_values("viscous")
+    inertia, law = arm.motor_values("inertia"), friction_law(arm)
 
     def efforts(t: float, q: Array, qd: Array) -> Array:
         speed = reference(t, 1)
         acceleration = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
-        links = np.array(newton_euler(arm, q.tolist(), qd.tolist(), acceleration.tolist()))
-        return links + (inertia * acceleration + viscous * qd + coulomb_friction(arm, speed))
+        position = q.tolist()
+        links = np.array(with_springs(arm, newton_euler(arm, position, qd.tolist(), acceleration.tolist()), position))
+        return np.asarray(links + (inertia * acceleration + law.viscous * qd + law.beyond_viscous(speed, speed)))
 
     return efforts
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.dynamics.drives import FrictionLaw, friction_law
 from armwright.simulation.complementarity import solve_complementarity
 from armwright.simulation.controllers import Controller
 from armwright.simulation.result import Brake, JointState
@@ -25,7 +26,10 @@ _OVER = 1e-9
 
 
 class Moment(NamedTuple):
-    """Efforts and accelerations at one moment, each (n,): M qdd + bias = tau + friction + hold."""
+    """Efforts and accelerations at one moment, each (n,): M qdd + bias = tau + friction + hold.
+
+    Of a joint that is held, friction is its offset alone: what holds it is in ``hold``.
+    """
 
     qdd: Array
     tau: Array
@@ -96,19 +100,25 @@ class Plant:
         return compile_arm(self.arm)
 
     @cached_property
-    def viscous(self) -> Array:
-        """Friction per speed, (n,)."""
-        return self.arm.motor_values("viscous")
+    def law(self) -> FrictionLaw:
+        """The friction of its drives."""
+        return friction_law(self.arm)
 
     @cached_property
-    def coulomb(self) -> tuple[Array, Array]:
-        """Dry friction against motion forward and backward, (n,) each."""
-        return self.arm.motor_values("coulomb_forward"), self.arm.motor_values("coulomb_backward")
+    def offset(self) -> Array:
+        """The part of friction that does not change, (n,)."""
+        return self.arm.motor_values("offset")
+
+    @cached_property
+    def break_away(self) -> tuple[Array, Array]:
+        """Dry friction against motion that begins forward and backward, (n,) each, above 0."""
+        rest = np.zeros(self.arm.n)
+        return self.law.dry(rest, rest + 1.0), -self.law.dry(rest, rest - 1.0)
 
     @property
     def dry(self) -> Flags:
         """Which joints have dry friction, (n,)."""
-        forward, backward = self.coulomb
+        forward, backward = self.break_away
         return (forward > 0) | (backward > 0)
 
     def moment(self, t: float, q: Array, qd: Array, phase: Phase) -> Moment:
@@ -126,9 +136,8 @@ class Plant:
         """Return mass matrix, efforts of drives, of friction, and the remainder for acceleration."""
         M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
-        forward, backward = self.coulomb
-        dry = np.where(direction > 0, forward, np.where(direction < 0, -backward, 0.0))
-        friction = np.where(locked, 0.0, -self.viscous * qd - dry)
+        law = self.law
+        friction = np.where(locked, 0.0 - self.offset, -law.viscous * qd - law.beyond_viscous(qd, direction))
         return M, tau, friction, tau + friction - bias
 
     def braked(self, t: float) -> Flags:
@@ -158,8 +167,8 @@ class Plant:
         touched = at_lower | at_upper | braked
         at_rest = (touched | self.dry) & (np.abs(qd) <= 10 * STILL)
         qd = np.where(at_rest, 0.0, qd)
-        lower = np.where(at_upper | braked, -np.inf, -self.coulomb[0])
-        upper = np.where(at_lower | braked, np.inf, self.coulomb[1])
+        lower = np.where(at_upper | braked, -np.inf, -self.break_away[0])
+        upper = np.where(at_lower | braked, np.inf, self.break_away[1])
         M, _, _, surplus = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
         direction = solve_complementarity(M, surplus, at_rest, lower, upper).direction
         locked = at_rest & (direction == 0)

@@ -94,7 +94,7 @@ class Brake:
 class Simulation:
     """A simulated motion of n joints at m moments.
 
-    At every moment M qdd + coriolis + gravity = tau + friction + hold.
+    At every moment M qdd + coriolis + gravity + springs = tau + friction + hold.
 
     Attributes:
         arm: the simulated arm.
@@ -104,13 +104,14 @@ class Simulation:
         qd: (m, n) joint speeds.
         qdd: (m, n) joint accelerations.
         tau: (m, n) efforts of the drives, within their limits [N m] or [N].
-        friction: (m, n) efforts of viscous and dry friction on moving joints, against their motion.
+        friction: (m, n) efforts of friction on moving joints, against their motion but for its offset; of joints at
+            rest the offset alone.
         hold: (m, n) efforts of what keeps joints at rest: dry friction, stops, brakes.
         state: (m, n) what each joint does, as numbers of ``JointState``.
         kinetic: (m,) energy of motion, rotors included [J].
-        potential: (m,) energy in the field of gravity [J].
+        potential: (m,) energy in the field of gravity and in springs [J].
         work: (m, n) what the drives have put in since the start [J].
-        heat: (m, n) what friction has taken out [J].
+        heat: (m, n) what friction has taken out [J]; its offset gives back what it takes where a joint returns.
         impact: (m,) what stops and brakes have taken out [J].
         events: what happened to joints, in order.
     """

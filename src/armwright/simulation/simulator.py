@@ -55,7 +55,8 @@ def simulate(
     """Simulate the motion of an arm under its drives.
 
     Args:
-        arm: the arm, with n joints; its motors have rotor inertia and friction, its limits stops and largest efforts.
+        arm: the arm, with n joints; its motors have rotor inertia and friction, its joints springs, its limits
+            stops and largest efforts.
         q: (n,) joint positions at the start [rad] or [m].
         qd: (n,) joint speeds at the start; at rest when left out.
         duration: how long [s].
@@ -77,8 +78,8 @@ def simulate(
         UnsupportedArmError: some joint moves nothing that resists an acceleration.
 
     Source:
-        TR-83-008, section 4 and appendix V; Gill (1951). The friction is Coulomb's, with dry friction at rest as
-        large as in motion.
+        TR-83-008, section 4 and appendix V; Gill (1951). The friction is that of ``Motor``: at rest it holds as much as
+        it takes when a motion begins.
     """
     start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")

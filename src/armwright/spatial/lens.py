@@ -50,6 +50,15 @@ class Lens:
         (fx, fy), (cx, cy) = self.focal, self.centre
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
+    @property
+    def numbers(self) -> Array:
+        """The numbers of the lens (9,): focal lengths, centre, distortion."""
+        return np.concatenate([self.focal, self.centre, self.distortion])
+
+    def with_numbers(self, numbers: Array) -> "Lens":
+        """Return a lens of the same pictures with other numbers (9,), as ``numbers`` has them."""
+        return attrs.evolve(self, focal=numbers[:2], centre=numbers[2:4], distortion=numbers[4:])
+
     def project(self, points: ArrayLike) -> Array:
         """Return the pixels (..., 2) of points (..., 3) in the frame of the camera, which lie before it (z > 0)."""
         points = floats(points, "points")

@@ -152,6 +152,13 @@ def skew_matrix(w: Array) -> Array:
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
 
 
+def rotation_with_z(z: Array) -> Array:
+    """Return a rotation (3, 3) whose z axis is a vector (3,) of length 1; its x axis is any that is across."""
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
 def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
     """Return the angle of the rotation from R_A to R_B, (...) [rad]; leading axes are broadcast."""
     R_A, R_B = of_shape(R_A, (3, 3), "rotation"), of_shape(R_B, (3, 3), "rotation")

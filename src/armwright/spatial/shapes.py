@@ -184,7 +184,7 @@ def collision_shapes(shape: Shape) -> tuple[Shape, ...]:
 
 
 def convex_solids(solids: Iterable[Solid]) -> list[Solid]:
-    """Return solids with the pieces of meshes in place of those that have some; see ``collision_shapes``."""
+    """Return solids with the pieces of meshes instead of those that have some; see ``collision_shapes``."""
     return [attrs.evolve(solid, shape=shape) for solid in solids for shape in collision_shapes(solid.shape)]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array, array_key, floats, read_only, reduce_by_fields
-from armwright.errors import InvalidValueError, ShapeError, shown
+from armwright.errors import InvalidValueError, MissingExtraError, ShapeError, shown
 from armwright.sweep.errors import SweepError
 
 # A structured array of m runs: a field per output, NaN where there is nothing; ``status``, a ``Status`` each; and
@@ -150,10 +150,13 @@ def evaluate(task: Task, points: Array) -> Rows:
 
     Raises:
         SweepError: the task returned something else than its outputs.
+        MissingExtraError: it needs a library that this machine does not have: no run would tell anything.
     """
     points = read_only(points)
     try:
         returned = task(points)
+    except MissingExtraError:
+        raise
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a run, the sweep goes on
         if len(points) == 1:
             return failed_row(task, Status.FAILED, f"{type(error).__name__}: {error}")

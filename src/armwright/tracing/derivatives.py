@@ -9,7 +9,7 @@ Where an operation has no derivative, the one here is
 - 0 for ``round`` and for comparisons, and so for what a choice gains by changing over: Coulomb friction, as a
   function of the velocity, has the derivative 0 at rest, too. A choice has the derivative of the branch that is chosen.
 - 0 for the absolute value at 0, and for the angle of the point (0, 0).
-- 0 for a root at 0 and below, where ``sqrt`` itself is 0.
+- 0 for a root at 0 and below, where ``sqrt`` itself is 0, and for a cube root at 0.
 
 Source:
     Griewank & Walther (2008), Evaluating Derivatives, chapter 3.
@@ -195,6 +195,15 @@ def _sqrt(graph: Graph, i: int, _operands: tuple[int, ...], _k: int, x: int) -> 
     return graph.apply("multiply", x, _inverse_where_positive(graph, 0.5, i))
 
 
+def _cbrt(graph: Graph, i: int, _operands: tuple[int, ...], _k: int, x: int) -> int:
+    # By the square of the root, which is positive on either side of 0.
+    return graph.apply("multiply", x, _inverse_where_positive(graph, 1 / 3, graph.apply("multiply", i, i)))
+
+
+def _exp(graph: Graph, i: int, _operands: tuple[int, ...], _k: int, x: int) -> int:
+    return graph.apply("multiply", x, i)
+
+
 def _atan2(graph: Graph, _i: int, operands: tuple[int, ...], k: int, x: int) -> int:
     squares = [graph.apply("multiply", a, a) for a in operands]
     inverse = _inverse_where_positive(graph, 1.0, graph.apply("add", *squares))
@@ -226,6 +235,8 @@ _PARTIALS: dict[str, Callable[[Graph, int, tuple[int, ...], int, int], int | Non
     "sin": _sin,
     "cos": _cos,
     "sqrt": _sqrt,
+    "cbrt": _cbrt,
+    "exp": _exp,
     "atan2": _atan2,
     "absolute": _absolute,
     "select": _select,

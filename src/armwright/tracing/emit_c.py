@@ -9,7 +9,7 @@ What it holds of the user's are numbers, and names as identifiers only.
 import hashlib
 import math
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -120,12 +120,15 @@ def cpp_header(functions: Sequence[Function]) -> str:
     Args:
         functions: what becomes a function, their names unlike.
     """
-    helpers = _cpp_helpers()
+    codes = [each.any_type() for each in functions]
+    graphs = [graph for code in codes for graph in _graphs(code)]
+    rare = [op for op in _RARE if any(node.op == op for graph in graphs for node in graph.nodes)]
+    helpers = _cpp_helpers(rare)
     # Headers of several versions may meet in one program: each finds the helpers that it was written with.
     space = f"detail_{_digest(helpers)[:8]}"
     bodies = [
-        _function(each, each.any_type(), _cpp(space), "template <class Real>\nARMWRIGHT_TEMPLATE int")
-        for each in functions
+        _function(each, code, _cpp(space), "template <class Real>\nARMWRIGHT_TEMPLATE int")
+        for each, code in zip(functions, codes, strict=True)
     ]
     guard = f"ARMWRIGHT_{space.upper()}"
     start = f"#ifndef {guard}\n#define {guard}\nnamespace armwright {{\nnamespace {space} {{\n"
@@ -442,6 +445,9 @@ def _real(value: float) -> str:
 
 # ---- languages ----
 
+# Functions that few equations have.
+_RARE = ("exp", "cbrt")
+
 OF_MATH = {"absolute": "fabs({0})", "sqrt": "sqrt({0})", "number": "(double){0}"}
 DOUBLE = Dialect(
     "double",
@@ -467,13 +473,15 @@ _FLOAT = Dialect(
         "sin": "sinf({0})",
         "cos": "cosf({0})",
         "atan2": "atan2f({0}, {1})",
+        "exp": "expf({0})",
+        "cbrt": "cbrtf({0})",
         "round": "rintf({0})",
     },
 )
 
 
 def _cpp(space: str) -> Dialect:
-    names = {"absolute": 1, "sqrt": 1, "fma": 3, "sin": 1, "cos": 1, "atan2": 2, "round": 1}
+    names = {"absolute": 1, "sqrt": 1, "fma": 3, "sin": 1, "cos": 1, "atan2": 2, "exp": 1, "cbrt": 1, "round": 1}
     operands = {op: ", ".join(f"{{{i}}}" for i in range(count)) for op, count in names.items()}
     calls = {op: f"{space}::{op}_of({operands[op]})" for op in names} | {"number": "Real({0} ? 1 : 0)"}
     limit = f"{space}::limit<Real>({{!r}})".format
@@ -564,12 +572,20 @@ inline Real {op}_of(const Real& x)
 """
 
 
-def _cpp_helpers() -> str:
-    """Return the functions of numbers: for any type, and for double the same operations as on this processor."""
-    text = "".join(
-        _CPP_GENERAL.format(op=op, name=name)
-        for op, name in {"absolute": "abs", "sqrt": "sqrt", "sin": "sin", "cos": "cos", "round": "rint"}.items()
-    )
+def _graphs(code: MachineCode) -> Iterator[Graph]:
+    """Give the graph of operations, and those of the steps of its loops."""
+    yield code.graph
+    yield from (step.graph for loop in code.graph.loops for step in loop.steps)
+
+
+def _cpp_helpers(rare: Iterable[str]) -> str:
+    """Return the functions of numbers: for any type, and for double the same operations as on this processor.
+
+    Args:
+        rare: functions that are not for every header.
+    """
+    names = {"absolute": "abs", "sqrt": "sqrt", "sin": "sin", "cos": "cos", "round": "rint", **{op: op for op in rare}}
+    text = "".join(_CPP_GENERAL.format(op=op, name=name) for op, name in names.items())
     text += (
         _CPP_GENERAL.replace("const Real& x", "const Real& y, const Real& x")
         .replace("(x)", "(y, x)")
@@ -614,7 +630,7 @@ inline float limit<float>(double value)
             "bit": "bit_of({0}, {1}) != 0",
         },
     )
-    return text + "".join(_written_out(op, dialect) for op in ("sin", "cos", "atan2", "round"))
+    return text + "".join(_written_out(op, dialect) for op in ("sin", "cos", "atan2", "round", *rare))
 
 
 def _written_out(op: str, dialect: Dialect) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from armwright.tracing.graph import Graph, Traced, reachable
-from armwright.tracing.scalar import Scalar, atan2, cos, round_half_even, select, sin, sqrt
+from armwright.tracing.scalar import Scalar, atan2, cbrt, cos, exp, round_half_even, select, sin, sqrt
 
 
 def evaluate(graph: Graph, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
@@ -49,6 +49,8 @@ _ON_ARRAYS: dict[str, Callable[..., Any]] = {
     "sin": sin,
     "cos": cos,
     "sqrt": sqrt,
+    "cbrt": cbrt,
+    "exp": exp,
     "atan2": atan2,
     "absolute": np.absolute,
     "round": round_half_even,

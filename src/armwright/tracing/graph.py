@@ -8,8 +8,8 @@ itself divides by 0, a product of 0 and the quotient is 0, not NaN.
 The operations of a graph are
 
 - ``constant`` and ``input``: leaves, with a value and an index.
-- ``add``, ``subtract``, ``multiply``, ``divide``, ``negate``, ``absolute``, ``sqrt``, ``sin``, ``cos``, ``atan2``, and
-  ``round``: to the nearest integer, the even one of two.
+- ``add``, ``subtract``, ``multiply``, ``divide``, ``negate``, ``absolute``, ``sqrt``, ``cbrt``, ``exp``, ``sin``,
+  ``cos``, ``atan2``, and ``round``: to the nearest integer, the even one of two.
 - ``less``, ``less_equal``: 1 where it holds, else 0; and ``select``: its second operand where the first is not 0, else
   its third.
 - ``loop``: see ``Loop``; and its results, ``state`` and ``each``.
@@ -28,6 +28,8 @@ import numpy as np
 from armwright.arrays import number
 
 _COMMUTATIVE = frozenset({"add", "multiply"})
+# The exponential function of more than this is beyond the range of float64.
+LARGEST_POWER = 709.782712893384
 # The results of a loop.
 _LOOP_RESULTS = frozenset({"state", "each"})
 
@@ -314,6 +316,11 @@ def _quotient(a: float, b: float) -> float:
     return math.nan if a == 0 or math.isnan(a) else math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
+def exponential(a: float) -> float:
+    """Return e to the power of ``a``, infinity beyond the range of float64."""
+    return math.exp(a) if not a > LARGEST_POWER else math.inf
+
+
 _FOLD: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
@@ -323,6 +330,8 @@ _FOLD: dict[str, Callable[..., float]] = {
     "sin": lambda a: math.sin(a) if math.isfinite(a) else math.nan,
     "cos": lambda a: math.cos(a) if math.isfinite(a) else math.nan,
     "sqrt": lambda a: math.sqrt(max(a, 0.0)),
+    "cbrt": math.cbrt,
+    "exp": exponential,
     "atan2": math.atan2,
     "absolute": abs,
     "round": lambda a: float(round(a)) if math.isfinite(a) else a,

@@ -1,10 +1,10 @@
 """From a traced graph to the operations of a processor, the same for every language that is emitted.
 
-Sines, cosines and arc tangents are written out, and which multiplication and addition become one instruction is
-written down, not left to a compiler: so a configuration has the same bits whatever the language, the width of the
-vectors, and the code around it.
+Elementary functions are written out, and which multiplication and addition become one instruction is written down, not
+left to a compiler: so a configuration has the same bits whatever the language, the width of the vectors, and the code
+around it.
 
-The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and ``round``, and
+The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2``, ``exp``, ``cbrt`` and ``round``, and
 
 - ``fma``: a · b + c, rounded once.
 - ``bit``: whether a bit of the representation of a number is set; its number is the value of the second operand.
@@ -13,8 +13,8 @@ The operations are those of a ``Graph`` without ``sin``, ``cos``, ``atan2`` and 
 
 The steps of loops are translated in the same way, each by itself; only numbers come in and go out.
 
-Code for other types of numbers than double keeps ``sin``, ``cos``, ``atan2`` and ``round``, which the library of its
-language has for each type. It has one more operation:
+Code for other types of numbers than double keeps these, which the library of its language has for each type. It has one
+more operation:
 
 - ``limit``: a constant that may be beyond the range of the type, which then has a limit of its own.
 """
@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from armwright.arrays import LARGEST, LARGEST_ANGLE
-from armwright.tracing.elementary import arc_tangent, root, rounded, sine_cosine
+from armwright.tracing.elementary import arc_tangent, cube_root, exponential, root, rounded, sine_cosine
 from armwright.tracing.graph import Graph, Loop, LoopStep, Node, Traced, reachable
 from armwright.tracing.scalar import select
 
@@ -33,7 +33,7 @@ TRUTHS = frozenset({"less", "less_equal", "bit", "both", "either", "differ", "no
 # The operations that may take in a multiplication.
 _SUMS = frozenset({"add", "subtract"})
 # What the library of a language has for each type of numbers.
-_OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "round"})
+_OF_A_LIBRARY = frozenset({"sin", "cos", "atan2", "exp", "cbrt", "round"})
 
 # Larger angles, which an equation may compute of its inputs, have no sine: it is NaN.
 _LARGEST_REDUCED = 1e15
@@ -364,7 +364,13 @@ _MAGNITUDES: dict[str, Callable[..., float]] = {
     "state": lambda _: LARGEST_ANGLE,
     "each": lambda _: LARGEST_ANGLE,
 }
-_WRITTEN_OUT: dict[str, Callable[..., Traced]] = {"atan2": arc_tangent, "round": rounded, "sqrt": root}
+_WRITTEN_OUT: dict[str, Callable[..., Traced]] = {
+    "atan2": arc_tangent,
+    "cbrt": cube_root,
+    "exp": exponential,
+    "round": rounded,
+    "sqrt": root,
+}
 
 
 def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[int, int]:

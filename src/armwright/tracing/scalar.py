@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from armwright.tracing.graph import Traced, is_traced, traced
+from armwright.tracing.graph import Traced, exponential, is_traced, traced
 
 # A float, an array of any shape with one value per configuration, or a ``Traced``. Equations use + - * / and the
 # functions below.
@@ -36,6 +36,16 @@ def cos(x: Scalar) -> Scalar:
 def sqrt(x: Scalar) -> Scalar:
     """Return the root of ``x``, and 0 for what rounding has pushed below 0."""
     return _evaluate("sqrt", lambda x: np.sqrt(np.maximum(x, 0.0)), lambda x: math.sqrt(max(x, 0.0)), x)
+
+
+def cbrt(x: Scalar) -> Scalar:
+    """Return the cube root of ``x``, which has its sign."""
+    return _evaluate("cbrt", np.cbrt, math.cbrt, x)
+
+
+def exp(x: Scalar) -> Scalar:
+    """Return e to the power of ``x``."""
+    return _evaluate("exp", np.exp, exponential, x)
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:

@@ -583,6 +583,27 @@ def test_what_an_arm_shows() -> None:
     assert shown["moves"].value.startswith("PTP apf1 of line 11, 0.000 s of ")
 
 
+def test_forces_and_moments() -> None:
+    """An arm that presses shows force and moment; ZERO FORCE is taken back by a step back."""
+    program = corpus_text("p07").replace("depth = DIST", "ZERO FORCE ARM_1 ; depth = DIST")
+    assert "ZERO FORCE" in program
+    debugger = load(program, "jam")
+    while "ZERO" not in program.splitlines()[line(debugger) - 1]:
+        run(debugger, "next")
+    pressed = scope(debugger, "Arms")["ARM_1"]
+    force = debugger.evaluate("FORCE(Z)").value
+    assert float(force) > 8
+    assert inside(pressed)["force"].value.endswith(f" {float(force):.6g}) N")
+    assert inside(pressed)["torque"].value.endswith(") N m")
+    assert abs(float(debugger.evaluate("TORQUE(Z)").value)) < 1e-9
+
+    run(debugger, "next")
+
+    assert float(debugger.evaluate("FORCE(Z)").value) == 0
+    run(debugger, "back")
+    assert debugger.evaluate("FORCE(Z)").value == force
+
+
 def test_units() -> None:
     """Lengths are shown in the unit of the program."""
     debugger = load("UNITS MM ;\nVAR f : FRAME ;\nBEGIN\n  f = (1,0,0, 0,1,0, 0,0,1, 400,0,20) ;\n  PRINT(f)\nEND.\n")

@@ -55,7 +55,7 @@ def test_every_word_is_explained() -> None:
         assert meaning is not None, word
         assert word in meaning.syntax
         assert meaning.text.endswith(".")
-    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | {"VISIONS", "SYSTEM"}
+    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | {"VISIONS", "SYSTEM", "ZERO FORCE"}
 
 
 @pytest.mark.parametrize(
@@ -100,6 +100,28 @@ def test_names_that_are_variables_only_sometimes() -> None:
     ]
 
 
+def test_names_that_are_words_together() -> None:
+    """ZERO and FORCE are names of variables, but start a statement together; TORQUE(X) has an axis, as FORCE has."""
+    text = "VAR zero, x : SCALAR ; BEGIN zero = TORQUE(x) ; ZERO { tare } FORCE ARM_1 ; x = zero END."
+    found = [(one.key, one.kind, one.writes) for one in analysis_of(text).occurrences if not one.declares]
+
+    assert found == [
+        ("ZERO", NameKind.VARIABLE, True),
+        ("TORQUE", NameKind.FUNCTION, False),
+        ("X", NameKind.AXIS, False),
+        ("ZERO FORCE", NameKind.SENSOR, False),
+        ("ZERO FORCE", NameKind.SENSOR, False),
+        ("ARM_1", NameKind.ARM, False),
+        ("X", NameKind.VARIABLE, True),
+        ("ZERO", NameKind.VARIABLE, False),
+    ]
+    for word in ("ZERO {", "FORCE"):
+        shown = hover(analysis_of(text), text.index(word), markdown=False)
+        assert shown is not None
+        assert isinstance(shown.contents, lsp.MarkupContent)
+        assert shown.contents.value.startswith("ZERO FORCE arm")
+
+
 # ---- completion ----------------------------------------------------------------------------------------------------
 
 HEAD = (
@@ -126,12 +148,14 @@ HEAD = (
         ("WAIT |", ["e"]),
         ("IF n > 1 |", ["AND", "OR", "THEN"]),
         ("IF n > 1 THEN OPEN ARM_1 |", ["TO", "ELSE"]),
-        ("WHILE |", ["n", "DIST", "FORCE", "NOT"]),
+        ("WHILE |", ["n", "DIST", "FORCE", "TORQUE", "NOT"]),
         ("FOR n = 1 TO 3 |", ["STEP", "DO"]),
         ("put (|", ["ARM_1", "f", "g", "parts"]),
-        ("put (f, |", ["n", "DIST", "FORCE"]),
-        ("t = XYZ(0, 0, |", ["n", "DIST", "FORCE"]),
+        ("put (f, |", ["n", "DIST", "FORCE", "TORQUE"]),
+        ("t = XYZ(0, 0, |", ["n", "DIST", "FORCE", "TORQUE"]),
         ("n = FORCE(|", ["X", "Y", "Z"]),
+        ("n = TORQUE(|", ["X", "Y", "Z"]),
+        ("ZERO FORCE |", ["ARM_1"]),
         ("f = g * |", ["ARM_1", "f", "g"]),
         ("n = parts[|", ["n"]),
         ("MOVE f TO g VIA (|", ["ARM_1", "f", "g"]),
@@ -142,7 +166,7 @@ HEAD = (
         ("MOVE f TO g | WITH DURATION = 3s", ["DIRECTLY", "STRAIGHTLY", "VIA", "ON", "WITH APPROACH"]),
         ("MOVE f TO g ON n > 1 DO |", ["HALT", "SIGNAL", "PRINT", "BEGIN"]),
         ("MOVE f TO g ON n > 1 |", ["AND", "OR", "DO"]),
-        ("f = (1, |", ["n", "DIST", "FORCE"]),
+        ("f = (1, |", ["n", "DIST", "FORCE", "TORQUE"]),
         ("COBEGIN PRIORITY 2 : |", ["BEGIN"]),
         ("n = 1 |", []),
         ("MOVE f VIA |", []),
@@ -164,7 +188,7 @@ def test_completion(written: str, first: list[str]) -> None:
         ("", "MOVE ", ["ARM_1", "f", "g"]),
         ("MO", "VE ", ["ARM_1", "f", "g"]),
         ("MOVE f", " TO g, ", ["DIRECTLY", "STRAIGHTLY", "VIA", "ON"]),
-        ("", "n = 1 ; put (f, ", ["n", "DIST", "FORCE"]),
+        ("", "n = 1 ; put (f, ", ["n", "DIST", "FORCE", "TORQUE"]),
         ("", "TRY n = 1 RECOVER WAIT ", ["e"]),
         ("", "{ 1 } MOVE ", ["ARM_1", "f", "g"]),
         ("", "{ MOVE ", []),
@@ -378,6 +402,8 @@ def test_any_text_gets_an_answer(seed: int) -> None:
         end = min(len(text), start + chance.choice([0, 0, 0, 1, 3, 40]))
         text = text[:start] + "".join(chance.choices(PIECES, k=chance.randrange(4))) + text[end:]
         place = chance.choice([start, chance.randrange(len(text) + 1)])
+        # A cursor is never within a line end.
+        place += text[max(0, place - 1) : place + 1] == "\r\n"
         ask_everything(analysis, text, place, "other")
         if chance.random() < 0.4:
             analysis = analysis_of(text, std=std)

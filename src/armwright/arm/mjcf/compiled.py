@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 import warnings
 from pathlib import Path
 from typing import Any
 
 from armwright.arm.mjcf.elements import MjcfText, Node, path_below
-from armwright.errors import FileFormatError
-from armwright.extras import import_extra
+from armwright.errors import FileFormatError, shown
 from armwright.files.inputs import read_bytes
 from armwright.files.limits import MEGABYTE, limit, limit_message
+from armwright.mujoco_library import load_mujoco
 
 _MESH_FILES = (".stl", ".obj")
 _LINE = re.compile(r"line (\d+)")
@@ -21,10 +22,10 @@ def compile_mjcf(path: Path, text: MjcfText) -> Any:
     """Return the model that MuJoCo makes of a text.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         FileFormatError: MuJoCo refuses the text, or a mesh file is missing or beyond a limit.
     """
-    mujoco = import_extra("mujoco", "reading MJCF", "physics", "mujoco-core")
+    mujoco = load_mujoco()
     try:
         spec = mujoco.MjSpec.from_string(text.text)
         spec.compiler.usethread = False
@@ -64,14 +65,20 @@ def _leave_out_pictures(mujoco: Any, spec: Any) -> None:
 
 def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
     """Read the mesh files, and return them by the names that the meshes have from now on."""
-    nodes = {node.attributes.get("file"): node for node in text.nodes if node.tag == "mesh"}
+    nodes: dict[str, Node] = {}
+    for each in text.nodes:
+        if each.tag == "mesh" and (name := each.attributes.get("file")):
+            # MuJoCo shortens paths such as `./a//b.stl`.
+            nodes[name] = nodes[posixpath.normpath(re.sub(r"[\\/]+", "/", name))] = each
     names: dict[Path, str] = {}
     files: dict[str, bytes] = {}
     total = 0
     for mesh in spec.meshes:
         if not mesh.file:
             continue
-        node = nodes[mesh.file]
+        node = nodes.get(mesh.file)
+        if node is None:
+            raise FileFormatError(path, None, "mesh", f"expected a plain file name, got one such as {shown(mesh.file)}")
         place = path_below(text.mesh_folder, node, "file", root=path.parent, bare=text.bare_names)
         kind = place.suffix.lower()
         if kind not in _MESH_FILES:
@@ -79,25 +86,25 @@ def _mesh_files(spec: Any, path: Path, text: MjcfText) -> dict[str, bytes]:
         if place not in names:
             names[place] = f"{len(names)}{kind}"
             try:
-                files[names[place]] = read_bytes(place, "meshes_mb")
+                files[names[place]] = read_bytes(place, "mesh_mb")
             except FileFormatError as error:
                 raise node.error("file", str(error)) from error
         # A file that two meshes are made of takes memory twice.
         total += len(files[names[place]])
-        if total > limit("meshes_mb") * MEGABYTE:
-            raise node.error("file", f"the meshes are too large together: {limit_message('meshes_mb')}")
+        if total > limit("mesh_mb") * MEGABYTE:
+            raise node.error("file", f"the meshes are too large together: {limit_message('mesh_mb')}")
         mesh.file = names[place]
     return files
 
 
 def _as_ours(error: Exception, path: Path, text: MjcfText) -> FileFormatError:
     """Return the error of MuJoCo, which counts the lines of the text that it got, in one line."""
-    said = " ".join(str(error).split())
+    message = " ".join(str(error).split())
     for start in ("XML Error: ", "Schema violation: ", "Error: "):
-        said = said.removeprefix(start)
-    number = _LINE.search(said)
+        message = message.removeprefix(start)
+    number = _LINE.search(message)
     node: Node | None = None
     if number and 0 < int(number[1]) <= len(text.nodes):
         node = text.nodes[int(number[1]) - 1]
-        said = said.partition(" Element ")[0]
-    return FileFormatError(path, None, "", said) if node is None else node.error("", said)
+        message = message.partition(" Element ")[0]
+    return FileFormatError(path, None, "", message) if node is None else node.error("", message)

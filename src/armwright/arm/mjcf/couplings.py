@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from armwright.mujoco_library import load_mujoco
+
 
 def couplings(model: Any) -> dict[int, str]:
     """Return what couples joints to something else, in words, by the numbers of the joints."""
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     coupled: dict[int, str] = {}
     tendons = [_joints_of_tendon(mujoco, model, i) for i in range(model.ntendon)]
     for number, joints in enumerate(tendons):

@@ -1,12 +1,14 @@
-"""Limits, drives and friction of joints of a model of MuJoCo."""
+"""Limits, drives, friction and springs of joints of a model of MuJoCo."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from armwright.arm.model import Limits, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import Limits
 from armwright.files.limits import limit
+from armwright.mujoco_library import load_mujoco
 
 # What MuJoCo takes as the largest number: a limit of this size says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e10
@@ -20,8 +22,7 @@ def limits_of(model: Any, joint: int, name: str) -> tuple[Limits, list[str]]:
         joint: its number.
         name: its name, for the sentences.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     ends, notes = (-math.inf, math.inf), []
     if model.jnt_limited[joint]:
         most = limit("revolutions") * math.tau if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE else NO_LIMIT
@@ -87,8 +88,7 @@ def motor_of(model: Any, joint: int, name: str) -> tuple[Motor, list[str]]:
         joint: its number.
         name: its name, for the sentences.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     dof = int(model.jnt_dofadr[joint])
     inertia, viscous = float(model.dof_armature[dof]), float(model.dof_damping[dof])
     for i in range(model.nu):
@@ -98,8 +98,24 @@ def motor_of(model: Any, joint: int, name: str) -> tuple[Motor, list[str]]:
             viscous += squared * float(model.actuator_damping[i])
     dry = float(model.dof_frictionloss[dof])
     notes = []
-    if model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any():
-        notes.append(f"joint '{name}': its spring is not read")
     if model.dof_dampingpoly[dof].any():
         notes.append(f"joint '{name}': of its damping only what is proportional to the speed is read")
     return Motor(inertia=inertia, viscous=viscous, coulomb_forward=dry, coulomb_backward=dry), notes
+
+
+def spring_of(model: Any, joint: int, name: str) -> tuple[Spring, list[str]]:
+    """Return the spring of a hinge or a slide, and sentences on what is not read of it.
+
+    Args:
+        model: of MuJoCo.
+        joint: its number.
+        name: its name, for the sentences.
+    """
+    stiffness, notes = float(model.jnt_stiffness[joint]), []
+    if stiffness < 0:
+        notes.append(f"joint '{name}': its spring, which pushes away with {-stiffness:g}, is not read")
+        stiffness = 0.0
+    if model.jnt_stiffnesspoly[joint].any():
+        notes.append(f"joint '{name}': of its spring only the linear part is read")
+    rest = float(model.qpos_spring[model.jnt_qposadr[joint]]) if stiffness else 0.0
+    return Spring(stiffness=stiffness, rest=rest), notes

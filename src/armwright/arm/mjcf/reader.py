@@ -15,6 +15,7 @@ from armwright.arm.tree.kinematic_tree import Lock, locked_positions
 from armwright.arm.tree.serial_arm import Reading, serial_arm
 from armwright.errors import FileFormatError, InvalidValueError, KindError, ShapeError, shown
 from armwright.files.inputs import file_path
+from armwright.mujoco_library import load_mujoco
 
 
 def load_mjcf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
@@ -35,7 +36,7 @@ def load_mjcf(path: Path | str, *, base: str | None = None, tip: str | None = No
     Raises:
         KindError: ``path`` is no path, ``lock`` one text, or a position no number.
         InvalidValueError: a joint is to be held where its limits do not let it.
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         UnknownNameError: there is no body or site, or no joint, of that name.
         FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
     """
@@ -61,7 +62,7 @@ def read_tree(path: Path, lock: Mapping[str, float] | None = None) -> MjcfTree:
         lock: where joints are held by their names [rad] or [m], as if they were fixed.
 
     Raises:
-        MissingExtraError: MuJoCo is not installed.
+        MissingExtraError: MuJoCo cannot be loaded.
         UnknownNameError: a joint to lock does not exist.
         InvalidValueError: a joint is to be held where its limits do not let it.
         FileFormatError: the file is missing, broken, or no MJCF.
@@ -77,8 +78,7 @@ def arm_in(tree: MjcfTree, base: str | None = None, tip: str | None = None) -> R
         UnknownNameError: there is no link of that name.
         FileFormatError: there is no such arm.
     """
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     model = tree.model
     gravity = model.opt.gravity * (not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from armwright.arm.mjcf.compiled import is_solid
 from armwright.arrays import Array
+from armwright.mujoco_library import load_mujoco
 from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import rotation_from_quaternion
 from armwright.spatial.shapes import Box, Capsule, Cylinder, Mesh, Shape, Solid, Sphere
@@ -44,14 +45,12 @@ def solid_of(model: Any, geom: int) -> Solid | None:
 
 def ellipsoids_of(model: Any, body: int) -> list[int]:
     """Return the geoms of a body that meet others and are no solids here."""
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     return [i for i in geoms_of(model, body) if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_ELLIPSOID]
 
 
 def _shape(model: Any, geom: int) -> Shape | None:
-    import mujoco  # noqa: PLC0415 - of MJCF only
-
+    mujoco = load_mujoco()
     kinds, (x, y, _) = mujoco.mjtGeom, model.geom_size[geom].tolist()
     match mujoco.mjtGeom(int(model.geom_type[geom])):
         case kinds.mjGEOM_BOX:

@@ -14,11 +14,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from armwright.arm.drive import Motor, Spring
 from armwright.arm.mjcf.couplings import couplings
-from armwright.arm.mjcf.drives import limits_of, motor_of
+from armwright.arm.mjcf.drives import limits_of, motor_of, spring_of
 from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
-from armwright.arm.model import Limits, Link, Motor
-from armwright.arm.tree.kinematic_tree import check_lock, listed
+from armwright.arm.model import Limits, Link
+from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, one_of
 from armwright.spatial.poses import homogeneous
@@ -99,6 +100,10 @@ class MjcfJoint:
         """Return its drive, and sentences on what an arm does not have."""
         return motor_of(self.model, self.number, self.name)
 
+    def spring(self) -> tuple[Spring, list[str]]:
+        """Return its spring, and sentences on what an arm does not have."""
+        return spring_of(self.model, self.number, self.name)
+
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
 
@@ -168,7 +173,7 @@ class MjcfTree:
         if not bases:
             raise self.error("no body moves by a hinge or a slide")
         if len(bases) > 1:
-            names = listed(list(bases))
+            names = quoted(list(bases))
             raise self.error(f"the base is ambiguous: it could be {names}; specify one as base (--base)")
         return next(iter(bases))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
-from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, listed
+from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, quoted
 from armwright.arrays import Array
 from armwright.errors import one_of
 from armwright.files.limits import limit, limit_message
@@ -126,10 +126,10 @@ def _default_tip(tree: Tree, base: str) -> tuple[str, tuple[str, ...]]:
     carrier = _carrier(tree, base, ends)
     if carrier is None:
         raise tree.error(
-            f"the tip link is ambiguous: it could be {listed(ends)}; specify one as tip: "
+            f"the tip link is ambiguous: it could be {quoted(ends)}; specify one as tip: "
             f"{tree.function}(path, tip='{ends[0]}'), or armwright convert {tree.path} --tip {ends[0]} -o arm.toml"
         )
-    note = f"the tool is '{carrier}', which carries {listed(ends)}; each moves as it does and may be the tip (--tip)"
+    note = f"the tool is '{carrier}', which carries {quoted(ends)}; each moves as it does and may be the tip (--tip)"
     return carrier, (note,)
 
 
@@ -177,7 +177,7 @@ def _refuse_loads(tree: Tree, branches: list[TreeJoint]) -> None:
         single, names = len(loaded) == 1, [joint.name for joint in loaded]
         does = "joint lies beside the chain, moves and has" if single else "joints lie beside the chain, move and have"
         raise loaded[0].error(
-            f"{len(loaded)} {does} mass to carry: {listed(names)}. An arm has no branches: choose another tip, or "
+            f"{len(loaded)} {does} mass to carry: {quoted(names)}. An arm has no branches: choose another tip, or "
             f"lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
         )
 

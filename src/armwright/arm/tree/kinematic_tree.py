@@ -7,11 +7,14 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import Limits, Link
 from armwright.arrays import Array, number
-from armwright.errors import FileFormatError, InvalidValueError, KindError, shown
+from armwright.errors import FileFormatError, InvalidValueError, KindError, listed, shown
 from armwright.spatial.shapes import Solid
 
+# So many names are in a message.
+_MAX_LISTED = 50
 # Joints that are held: their names, or their positions by their names [rad] or [m].
 Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
@@ -56,6 +59,9 @@ class TreeJoint(Protocol):
 
     def motor(self) -> tuple[Motor, list[str]]:
         """Return its drive, and sentences on what was not taken as it stands."""
+
+    def spring(self) -> tuple[Spring, list[str]]:
+        """Return its spring, and sentences on what was not taken as it stands."""
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -119,10 +125,9 @@ class Tree(Protocol):
         """Return the error that says ``message`` of the whole file."""
 
 
-def listed(names: Sequence[str], most: int = 50) -> str:
-    """Return names for a message, not more than some of them."""
-    more = f" and {len(names) - most:,} more" if len(names) > most else ""
-    return ", ".join(f"'{name}'" for name in names[:most]) + more
+def quoted(names: Sequence[str]) -> str:
+    """Return names in quotes for a message, not more than some of them."""
+    return listed([f"'{name}'" for name in names], _MAX_LISTED)
 
 
 def locked_positions(lock: Lock) -> dict[str, float]:

@@ -60,11 +60,12 @@ def serial_arm(
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
         limits, unknown = moving.joint.limits()
         motor, ignored = moving.joint.motor()
+        spring, not_linear = moving.joint.spring()
         kind: JointKind = "prismatic" if moving.joint.prismatic else "revolute"
-        joints.append(Joint(kind=kind, **attrs.asdict(row), limits=limits, name=moving.joint.name))
+        joints.append(Joint(kind=kind, **attrs.asdict(row), limits=limits, spring=spring, name=moving.joint.name))
         links.append(attrs.evolve(_link(moving.bodies, X, size), name=moving.joint.child))
         motors.append(motor)
-        notes += [*unknown, *ignored]
+        notes += [*unknown, *not_linear, *ignored]
     arm = Arm(
         name=tree.name,
         joints=joints,

@@ -1,4 +1,4 @@
-"""What the links of a URDF file look like: the shapes in <collision>, or in <visual> where a link has no such."""
+"""The solids of the links of a URDF file: the shapes in <collision>, or in <visual> where a link has no such."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def has_unread_shapes(link: Element, meshes: MeshFiles) -> bool:
 
 
 def _shape_elements(link: Element) -> list[tuple[Element, Element]]:
-    """Return the elements that say what a link looks like, each with its <geometry>."""
+    """Return the elements of the shapes of a link, each with its <geometry>."""
     for tag in _TAGS:
         pairs = [(element, element.find("geometry")) for element in link.find_all(tag)]
         found = [(element, geometry) for element, geometry in pairs if geometry is not None and geometry.children]

@@ -11,6 +11,7 @@ import attrs
 from armwright.arm.urdf.elements import Element
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, MissingExtraError, shown
 from armwright.files.inputs import file_below
+from armwright.files.limits import limit, limit_message
 from armwright.spatial.shapes import Mesh
 
 # Of meshes that are not read, so many are named.
@@ -68,6 +69,9 @@ class MeshFiles:
                 return None
             except (FileFormatError, InvalidValueError) as error:
                 raise element.error("filename", f"{error}; a scale is for lengths in another unit than m") from error
+            triangles = sum(len(mesh.faces) for mesh in self._read.values())
+            if triangles > limit("file_triangles"):
+                raise element.error("filename", f"too many in this file: {limit_message('file_triangles', triangles)}")
         return self._read[key]
 
     def _path(self, name: str) -> Path:

@@ -62,5 +62,8 @@ def read_urdf(
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
     if packages is not None and not isinstance(packages, Mapping):
         raise KindError(f"packages: expected folders by the names of packages, got {shown(packages)}")
+    for name, folder in (packages or {}).items():
+        if not isinstance(name, str) or not isinstance(folder, str | Path):
+            raise KindError(f"packages: expected the path of a folder for {shown(name)}, got {shown(folder)}")
     robot = read_robot(file_path(path), locked_positions(lock), packages)
     return serial_arm(robot, base, tip, UPRIGHT_GRAVITY)

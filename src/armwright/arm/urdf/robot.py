@@ -10,9 +10,10 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.drive import Motor, Spring
+from armwright.arm.model import Limits, Link
 from armwright.arm.tensors import impossible_moments, moments_message
-from armwright.arm.tree.kinematic_tree import check_lock, listed
+from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arm.urdf.elements import Element, origin_of, read_elements
 from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.meshes import MeshFiles
@@ -88,6 +89,10 @@ class UrdfJoint:
         """Return its friction."""
         return motor_of(self), []
 
+    def spring(self) -> tuple[Spring, list[str]]:
+        """Return that it has none: URDF has no springs."""
+        return Spring(), []
+
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the joint."""
         return self.element.error("", message)
@@ -141,7 +146,7 @@ class Robot:
         """
         roots = [name for name in self.links if name not in self.parent_joints]
         if len(roots) > 1:
-            raise self.error(f"the base link is ambiguous: it could be {listed(roots)}; specify one as base (--base)")
+            raise self.error(f"the base link is ambiguous: it could be {quoted(roots)}; specify one as base (--base)")
         return roots[0]
 
     def body(self, link: str) -> Link:
@@ -156,7 +161,7 @@ class Robot:
         """Return sentences on the shapes of links that are not read."""
         unread = [link for link in links if has_unread_shapes(self.links[link], self.meshes)]
         kinds = f"boxes, cylinders, spheres and capsules up to {LARGEST_SIZE:g} m"
-        notes = [f"of shapes, {kinds} are read; links with others: {listed(unread)}"] if unread else []
+        notes = [f"of shapes, {kinds} are read; links with others: {quoted(unread)}"] if unread else []
         return [*notes, *self.meshes.notes()]
 
     def error(self, message: str) -> FileFormatError:

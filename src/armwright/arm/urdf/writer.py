@@ -13,8 +13,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs
+from armwright.arm.drive import Motor
 from armwright.arm.losses import lost_beside_joints, lost_of_joint, mean_dry_friction
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link, Motor
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link
 from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.arm.urdf.geometry import primitives
@@ -68,9 +69,11 @@ def lost_in_urdf(arm: Arm) -> list[str]:
 
 def _lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
     """Say what of one joint, from 0, and its link is lost."""
-    motor, link, units = arm.motors[index], arm.links[index], arm.joints[index].units
+    motor, link, joint, label = arm.motors[index], arm.links[index], arm.joints[index], arm.joint_label(index)
+    units = joint.units
+    if joint.spring.stiffness:
+        yield f"{label}: its spring of {joint.spring.stiffness:g} {units.stiffness} is not in the file"
     if motor.inertia:
-        label = arm.joint_label(index)
         yield f"{label}: the inertia of the drive, {motor.inertia:g} {units.inertia}, is not in the file"
     yield from lost_of_joint(arm, index)
     yield from _lost_solids(f"link {index + 1}", link.solids)

@@ -1,4 +1,4 @@
-"""Code of OPEN, GRASP, OPERATE and READ."""
+"""Code of OPEN, GRASP, OPERATE, READ and ZERO FORCE."""
 
 from armwright.program.bytecode.context import Context, Generators, one_instruction
 from armwright.program.bytecode.instructions import Op
@@ -31,4 +31,5 @@ GENERATORS: Generators = {
     tree.Operate: operate,
     tree.ReadVisions: read_visions,
     tree.ReadSystem: one_instruction(Op.READS),
+    tree.ZeroForce: one_instruction(Op.ZEROF),
 }

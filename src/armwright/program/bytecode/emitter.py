@@ -79,6 +79,9 @@ class Emitter:
                 return self._matrix(node, into or self.passing())
             case tree.Function(name=name, arguments=arguments):
                 operands = [self.value(argument) for argument in arguments]
+                if name.key == "TORQUE":
+                    # Force and moment are read by one operation.
+                    return self._operation(Op.FORCE, into or self.passing(), f"M{operands[0]}", node=node)
                 return self._operation(Op[name.key], into or self.passing(), *operands, node=node)
             case tree.Unary():
                 value = self.value(node.operand)

@@ -18,9 +18,9 @@ class Op(enum.StrEnum):
 
     The operands have a letter each: N a number, P a pose or transformation, T a truth value, v any value, t any value
     or a text; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a counter; k and K a constant of one
-    and of twelve numbers, j a jump target; a an axis, o ON or OFF, r RIGIDLY, w any word. What is in brackets may be
-    left out, + stands for any number more of the last. In front of `=` is what the result is, which goes to the first
-    operand.
+    and of twelve numbers, j a jump target; a an axis, of a moment with M in front, o ON or OFF, r RIGIDLY, w any word.
+    What is in brackets may be left out, + stands for any number more of the last. In front of `=` is what the result
+    is, which goes to the first operand.
 
     Attributes:
         signature: the letters of its operands.
@@ -70,6 +70,7 @@ class Op(enum.StrEnum):
     OPER = "OPER", "wo"  # device, ON or OFF
     READV = "READV", "F"  # frame: ask the vision system
     READS = "READS", "w"  # arm: read the joint sensors
+    ZEROF = "ZEROF", "w"  # arm: its present force and moment count as zero
     # motion
     MVBEG = "MVBEG", "FP"  # moved, goal: a motion begins
     MVDIR = "MVDIR", ""  # the shortest way in joint space

@@ -36,7 +36,7 @@ _VALUES = {"N": (Value.NUMBER,), "C": (Value.NUMBER,), "P": (Value.POSE,), "T": 
 _NAMES = {"F": VariableKind.FRAME, "S": VariableKind.SCALAR, "E": VariableKind.EVENT}
 # The words that an operand may be, and what is said of others.
 _WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
-    "a": (("X", "Y", "Z"), "{op} expects the axis X, Y or Z, got {word}"),
+    "a": (("X", "Y", "Z", "MX", "MY", "MZ"), "{op} expects the axis X, Y or Z, or MX, MY or MZ, got {word}"),
     "o": (("ON", "OFF"), "{op} expects ON or OFF, got {word}"),
     "r": (("RIGIDLY",), "the last operand of {op} may only be RIGIDLY"),
 }

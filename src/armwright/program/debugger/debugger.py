@@ -10,8 +10,8 @@ import numpy as np
 
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import expressions, variables
 from armwright.program.debugger.breakpoints import Breakpoint, HitConditionError, Watch, matches_hit_count
@@ -48,7 +48,7 @@ class Debugger:
     """
 
     def __init__(
-        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = Simulator
+        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = kinematic_cell
     ) -> None:
         """Load a program.
 

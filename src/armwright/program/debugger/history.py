@@ -12,7 +12,7 @@ import attrs
 
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.cell.simulator import Simulator
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.vm.interpreter import advance, next_process, ready_process
 from armwright.program.vm.machine import Limits, Machine
@@ -65,7 +65,7 @@ class Timeline:
     """
 
     def __init__(
-        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = Simulator
+        self, code: Code, cell: Cell, limits: Limits | None = None, hardware: HardwareFactory = kinematic_cell
     ) -> None:
         """Stand in front of the first instruction."""
         self.machine = Machine(code, cell, hardware(cell), limits)

@@ -205,14 +205,16 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
     joints = [Variable(name=f"joint {number}", value=text) for number, text in enumerate(texts, 1)]
 
     def children() -> list[Variable]:
-        holds, force = machine.state.hands[name].held_frame, machine.hardware.contact_force(name, machine.now).tolist()
+        holds = machine.state.hands[name].held_frame
+        wrench = machine.hardware.contact_wrench(name, machine.now).tolist()
         hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
         return [
             *joints,
             attrs.evolve(hand, expression=name, slot=name),
             Variable(name="moves", value=_motion_text(machine, name)),
             Variable(name="holds", value=machine.spelling(holds) if holds else "nothing"),
-            Variable(name="force", value=f"({', '.join(f'{component:.6g}' for component in force)}) N"),
+            Variable(name="force", value=f"({', '.join(f'{component:.6g}' for component in wrench[:3])}) N"),
+            Variable(name="torque", value=f"({', '.join(f'{component:.6g}' for component in wrench[3:])}) N m"),
         ]
 
     return Variable(name=name, value=", ".join(texts), type=arm.name, children=children)

@@ -16,8 +16,8 @@ import attrs
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.reader import read_cell
-from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
@@ -80,7 +80,7 @@ def _run_cell(text: str) -> Cell | None:
 def _hardware(text: str) -> HardwareFactory:
     """Return how the cell is set up in which a program is run."""
     if not _PHYSICS.search(text):
-        return Simulator
+        return kinematic_cell
     from armwright.physics.world import PhysicsCell  # noqa: PLC0415 - few programs need it
 
     return PhysicsCell

@@ -5,6 +5,7 @@ from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
+from armwright.program.semantics.builtins import WITH_AXIS
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
@@ -25,7 +26,7 @@ def require_value(state: FlowState, *nodes: tree.Expression | None) -> None:
             require_value(state, *node.indices)
             _require_variable(state, node)
         elif isinstance(node, tree.Function):
-            waiting += reversed(node.arguments if node.name.key != "FORCE" else ())
+            waiting += reversed(node.arguments if node.name.key not in WITH_AXIS else ())
         elif isinstance(node, tree.ArmName):
             state.check_arm(node.key, node.span)
         elif isinstance(node, tree.Unary):

@@ -1,4 +1,4 @@
-"""OPEN, GRASP, OPERATE and READ: grippers, devices and sensors."""
+"""OPEN, GRASP, OPERATE, READ and ZERO FORCE: grippers, devices and sensors."""
 
 from armwright.errors import closest
 from armwright.program.flow_analysis.context import Steps, of_state
@@ -71,6 +71,13 @@ def read_system(state: FlowState, node: tree.ReadSystem) -> None:
         state.table.displace(node.arm.key, mover=node.arm.key)
 
 
+def zero_force(state: FlowState, node: tree.ZeroForce) -> None:
+    """Zero the sensor of forces of an arm."""
+    if isinstance(node.arm, tree.ArmName):
+        state.note_arms(node.arm)
+        state.note_arm_use(node.arm.key, node.span)
+
+
 def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
     """Read frames from the camera."""
     for target in node.targets:
@@ -108,4 +115,5 @@ STEPS: Steps = {
     tree.Operate: of_state(operate),
     tree.ReadVisions: of_state(read_visions),
     tree.ReadSystem: of_state(read_system),
+    tree.ZeroForce: of_state(zero_force),
 }

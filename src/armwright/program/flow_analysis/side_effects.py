@@ -177,6 +177,7 @@ _OWN_EFFECTS: Mapping[type, Callable[..., SideEffects]] = {
     tree.Unfix: lambda scope, node: SideEffects(affixed=_names(scope, node.child), arms=_arms(scope, node.parent)),
     tree.Open: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.ReadSystem: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
+    tree.ZeroForce: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
     tree.Grasp: lambda scope, node: SideEffects(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
     tree.ReadVisions: lambda scope, node: SideEffects(posed=_names(scope, *node.targets)),
     tree.Move: lambda scope, node: SideEffects(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),

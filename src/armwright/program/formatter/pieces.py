@@ -7,8 +7,8 @@ from itertools import pairwise, takewhile
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.language.words import SENSORS
-from armwright.program.semantics.builtins import AXES, FUNCTIONS
+from armwright.program.language.words import SENSORS, statement_phrase
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
 
@@ -151,8 +151,8 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
             yield key
         elif kind is _NAME:
             follows = tokens[index + 1].key if index < last else ""
-            is_axis = before == "(" and earlier == "FORCE" and key in AXES and follows == ")"
-            if in_units or is_axis or (before == "READ" and key in SENSORS):
+            is_axis = before == "(" and earlier in WITH_AXIS and key in AXES and follows == ")"
+            if in_units or is_axis or statement_phrase(before, key, follows) or (before == "READ" and key in SENSORS):
                 yield key
             elif before == "OPERATE":
                 yield token.text

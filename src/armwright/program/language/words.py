@@ -19,6 +19,22 @@ WITH_CLAUSES = ("APPROACH", "DEPARTURE", "SPEED")
 # Words only after READ: programs may use them as names.
 SENSORS = ("VISIONS", "SYSTEM")
 
+# What starts a statement only in front of another word, and that word: programs may use both as names.
+STATEMENT_PHRASES = {"ZERO": "FORCE"}
+
+
+def statement_phrase(before: str, key: str, after: str) -> str:
+    """Return the two words that start a statement together, where a word is one of them; empty where it is not.
+
+    Args:
+        before: the word in front of it, in upper case.
+        key: the word.
+        after: the word behind it.
+    """
+    pairs = (pair for pair in ((key, after), (before, key)) if STATEMENT_PHRASES.get(pair[0]) == pair[1])
+    return " ".join(next(pairs, ()))
+
+
 # What starts a statement in RLO-2, and what RLO-83 lacks. All of these may be names in RLO-83.
 RLO_2_STATEMENTS = {
     "FOR": "RLO-83 has no loops",

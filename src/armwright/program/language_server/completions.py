@@ -11,14 +11,14 @@ from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
-from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
 from armwright.program.syntax.expected_tokens import ExpectedTokens
@@ -50,6 +50,7 @@ _WORD_SNIPPETS = {
     "ON": "ON ${1:condition} DO ${2:HALT}",
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
+    "FORCE": "FORCE ${1:ARM_1}",
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
@@ -86,7 +87,7 @@ class _OperandRule:
 
 
 _STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
-_MEASURES = ("DIST", "FORCE")
+_MEASURES = ("DIST", *WITH_AXIS)
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
 _ANY_VALUE = _OperandRule(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
 _NUMBER = _OperandRule(kinds=_SCALAR, functions=_MEASURES)
@@ -118,7 +119,7 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
 }
 # What functions take.
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
-    "FORCE": _OperandRule(words=AXES),
+    **dict.fromkeys(WITH_AXIS, _OperandRule(words=AXES)),
     "DIST": _POSE,
     "INV": _STEP,
     **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
@@ -206,6 +207,8 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
             continue
         if last in allowed and (word != "RETRY" or expected.is_in_recovery):
             yield word
+    if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
+        yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
 
 
 class _ItemFactory:
@@ -236,7 +239,7 @@ class _ItemFactory:
         """Give words of the language and, where a statement starts, statements that begin with them."""
         for word in words:
             last = word.rpartition(" ")[2]
-            doc = word_doc(last, "MOVE") or WordDoc("", "")
+            doc = word_doc(word) or word_doc(last, "MOVE") or WordDoc("", "")
             # What stands before the last word, such as WITH, stays before its snippet.
             text = word.removesuffix(last) + _WORD_SNIPPETS.get(last, last)
             entries = [(word, Kind.TypeParameter if word in _TYPES else Kind.Keyword, text)]

@@ -10,7 +10,7 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import RLO_2_TYPES, SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import RLO_2_TYPES, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.line_numbers import blank_line_numbers
@@ -32,6 +32,12 @@ def _any_of(words: Collection[str]) -> str:
     return rf"(?a:{'|'.join(sorted(words))})(?!\w)"
 
 
+def _phrases() -> Iterator[tuple[str, _TokenType, str]]:
+    """Yield the rules of words that start a statement in front of another one."""
+    for one, other in STATEMENT_PHRASES.items():
+        yield rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase"
+
+
 class RloLexer(RegexLexer):
     """A Pygments lexer for RLO-2, which holds RLO-83.
 
@@ -47,6 +53,7 @@ class RloLexer(RegexLexer):
         "root": [
             include("blank"),
             (_any_of(["READ"]), Keyword, "sensor"),
+            *_phrases(),
             (_any_of(["UNITS"]), Keyword.Declaration, "units"),
             (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
             include("reserved"),
@@ -87,6 +94,7 @@ class RloLexer(RegexLexer):
             (r"[;,:.()\[\]]", Punctuation),
         ],
         "sensor": [include("blank"), (_any_of(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
+        "phrase": [include("blank"), (_any_of(STATEMENT_PHRASES.values()), Keyword.Pseudo, "#pop")],
         "units": [include("blank"), (_any_of(UNITS), Keyword.Type), (r",", Punctuation), default("#pop")],
         "unit": [(_any_of(UNITS), Keyword.Type, "#pop")],
         "procedure": [

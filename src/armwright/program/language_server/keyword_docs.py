@@ -61,6 +61,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "VISIONS": ("READ VISIONS (frames)", "Assigns the poses that the camera measures to the frames."),
     "SYSTEM": ("READ SYSTEM (arm)", "Reads the joint sensors of an arm; frames affixed to its gripper follow."),
+    "ZERO FORCE": (
+        "ZERO FORCE arm",
+        "From now on FORCE and TORQUE of an arm are what is measured less what is measured now.",
+    ),
     # motion
     "MOVE": (_MOVE, "Moves an arm, or a frame that is affixed to an arm, to the pose of the goal."),
     "DIRECTLY": (_MOVE, "Moves all joints at once, without a straight path of the tool; this is the default."),
@@ -113,6 +117,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "INV": ("INV (transformation)", "The inverse; INV(f) * g is the transformation from frame f to frame g."),
     "DIST": ("DIST (frame, frame)", "The distance between two frames, in the length unit of the program."),
     "FORCE": ("FORCE (X | Y | Z)", "The force on the gripper of the moving arm along an axis of the world, in N."),
+    "TORQUE": (
+        "TORQUE (X | Y | Z)",
+        "The moment on the gripper of the moving arm about its tool point, along an axis of the world, in N m.",
+    ),
 }
 
 WORDS = {word: WordDoc(*doc) for word, doc in _DOCS.items()}

@@ -9,7 +9,7 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import word_doc
-from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.builtins import FUNCTIONS, WITH_AXIS
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _PARAMETERS = {
@@ -17,7 +17,7 @@ _PARAMETERS = {
     "XYZ": ("x", "y", "z"),
     "INV": ("step",),
     "DIST": ("frame", "frame"),
-    "FORCE": ("X | Y | Z",),
+    **dict.fromkeys(WITH_AXIS, ("X | Y | Z",)),
 }
 
 

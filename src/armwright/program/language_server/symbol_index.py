@@ -8,8 +8,8 @@ import attrs
 
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
-from armwright.program.language.words import SENSORS
-from armwright.program.semantics.builtins import AXES, FUNCTIONS
+from armwright.program.language.words import SENSORS, statement_phrase
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -119,7 +119,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
                 name.writes = True
             elif previous in STATEMENT_OPENERS or not previous:
                 name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
-            elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key == "FORCE":
+            elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key in WITH_AXIS:
                 name.kind, name.owner, name.type = NameKind.AXIS, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
@@ -139,8 +139,9 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
         return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)
     if in_units:
         return Occurrence(start, end, key, NameKind.UNIT)
-    if previous == "READ" and key in SENSORS:
-        return Occurrence(start, end, key, NameKind.SENSOR)
+    phrase = statement_phrase(previous, key, next_key)
+    if phrase or (previous == "READ" and key in SENSORS):
+        return Occurrence(start, end, phrase or key, NameKind.SENSOR)
     if previous == "OPERATE":
         return Occurrence(start, end, key, NameKind.DEVICE)
     if next_key == "(" and key in FUNCTIONS:

@@ -6,7 +6,7 @@ import attrs
 
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell
-from armwright.cell.simulator import Simulator
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -19,7 +19,7 @@ from armwright.program.vm.process import Process
 
 def new_machine(cell: Cell, source: Source, limits: Limits) -> Machine:
     """Return a machine that has done nothing yet."""
-    return Machine(Code(instructions=(), types=PREDECLARED, source=source), cell, Simulator(cell), limits)
+    return Machine(Code(instructions=(), types=PREDECLARED, source=source), cell, kinematic_cell(cell), limits)
 
 
 def load_code(machine: Machine, code: Code, limits: Limits) -> Machine:

@@ -12,6 +12,10 @@ from armwright.program.semantics.scopes import NameResolver
 from armwright.program.syntax import tree
 
 AXES = ("X", "Y", "Z")
+# Functions whose argument is an axis, not a variable.
+WITH_AXIS = ("FORCE", "TORQUE")
+# Procedures of programs may have the names of these: they came later than such programs.
+PROCEDURES_MAY_HIDE = ("TORQUE",)
 
 
 @attrs.frozen
@@ -41,7 +45,7 @@ FUNCTIONS: Mapping[str, Signature] = {
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), Signature("one angle", 1, _SCALARS, ExpressionType.TRANS, "angle")),
     "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
     "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
-    "FORCE": Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR),
+    **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),
 }
 _INVERSES = {ExpressionType.FRAME: ExpressionType.INVERSE, ExpressionType.INVERSE: ExpressionType.FRAME}
 
@@ -62,8 +66,8 @@ def result_type(
         count = counted(len(node.arguments), "argument")
         names.report("E220", f"{required}, not {count}", node.span, f"{count} here")
         return signature.result if key != "INV" else None
-    if key == "FORCE":
-        _check_axis(names, node.arguments[0])
+    if key in WITH_AXIS:
+        _check_axis(names, key, node.arguments[0])
         return signature.result
     for argument, argument_type in zip(node.arguments, argument_types, strict=True):
         if argument_type is ExpressionType.EVENT:
@@ -78,9 +82,9 @@ def result_type(
     return _INVERSES.get(inverted, inverted) if inverted in signature.argument_types else None
 
 
-def _check_axis(names: NameResolver, node: tree.Expression) -> None:
+def _check_axis(names: NameResolver, function: str, node: tree.Expression) -> None:
     if isinstance(node, tree.Poison) or (isinstance(node, tree.Name) and node.key in AXES):
         return
     names.mark_used(variable_keys(node))
-    text = f"FORCE takes one axis, X, Y or Z, not {quote_expression(node)}"
-    names.report("E220", text, node.span, "no axis", advice="write `FORCE(Z)`")
+    text = f"{function} takes one axis, X, Y or Z, not {quote_expression(node)}"
+    names.report("E220", text, node.span, "no axis", advice=f"write `{function}(Z)`")

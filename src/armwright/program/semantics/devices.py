@@ -1,4 +1,4 @@
-"""OPEN, GRASP, OPERATE and READ: the arms, devices and frames that they name."""
+"""OPEN, GRASP, OPERATE, READ and ZERO FORCE: the arms, devices and frames that they name."""
 
 from armwright.program.language.diagnostic import did_you_mean
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -83,4 +83,5 @@ CHECKS: Checks = {
     tree.Operate: operate,
     tree.ReadVisions: read_visions,
     tree.ReadSystem: lambda context, node: _arm(context.names, node.arm, "READ SYSTEM"),
+    tree.ZeroForce: lambda context, node: _arm(context.names, node.arm, "ZERO FORCE"),
 }

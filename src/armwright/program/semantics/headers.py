@@ -7,7 +7,7 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
-from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.builtins import FUNCTIONS, PROCEDURES_MAY_HIDE
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
@@ -176,7 +176,7 @@ def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSy
     elif name.key in names.symbols.types:
         where = "an IMPORT brings" if name.key in names.symbols.imported else "is predeclared"
         names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
-    elif name.key in FUNCTIONS:
+    elif name.key in FUNCTIONS and name.key not in PROCEDURES_MAY_HIDE:
         text = f"`{name.text}` is a function of the language"
         names.report("E203", text, name.span, "a procedure of the same name")
     else:

@@ -1,4 +1,4 @@
-"""Parsing statements about hands, devices and sensors: OPEN, GRASP, OPERATE and READ."""
+"""Parsing statements about hands, devices and sensors: OPEN, GRASP, OPERATE, READ and ZERO FORCE."""
 
 # ruff: noqa: ERA001 - each rule of the grammar stands above its function
 
@@ -74,3 +74,11 @@ def read(tokens: TokenStream) -> tree.ReadVisions | tree.ReadSystem:
     if len(arms) > 1:
         tokens.report("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
     return tokens.node(tree.ReadSystem, start, arms[0] if arms else tree.Poison(tokens.gap_span()))
+
+
+# zero = "ZERO" "FORCE" arm ;
+def zero_force(tokens: TokenStream) -> tree.ZeroForce:
+    """Read one ZERO FORCE."""
+    start = tokens.take()
+    tokens.take()
+    return tokens.node(tree.ZeroForce, start, mobile(tokens, _ARM, "after ZERO FORCE"))

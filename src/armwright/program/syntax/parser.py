@@ -27,6 +27,7 @@ _RULES: Mapping[str, Rule] = {
     "GRASP": devices.grasp,
     "OPERATE": devices.operate,
     "READ": devices.read,
+    "ZERO": devices.zero_force,
     "MOVE": move,
     "(": control_flow.call,
     "BEGIN": control_flow.block,

@@ -159,6 +159,8 @@ class _ConformanceVisitor:
         if isinstance(node, tree.Block):
             what, instead = "a block inside a program", "RLO-83 has one BEGIN and one END"
             return self._reject_statement(node, what, word.span, instead)
+        if isinstance(node, tree.ZeroForce):
+            return self._reject_statement(node, "ZERO FORCE", word.span, "RLO-83 has no forces")
         return self._reject_statement(node, word.key, word.span, RLO_2_STATEMENTS[word.key])
 
     def _reject_statement(self, node: tree.Statement, what: str, span: Span, instead: str) -> tree.Poison:

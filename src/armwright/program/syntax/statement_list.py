@@ -6,7 +6,13 @@ from typing import TypeVar
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean, labels
 from armwright.program.language.source import Span
-from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, FOREIGN_STATEMENTS, UNSUPPORTED_STATEMENTS
+from armwright.program.language.words import (
+    BLOCK_CLOSERS,
+    BLOCK_OPENERS,
+    FOREIGN_STATEMENTS,
+    STATEMENT_PHRASES,
+    UNSUPPORTED_STATEMENTS,
+)
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.token_stream import ANY_VALUE, NestingError, PanicModeError, TokenStream, describe_token
@@ -62,7 +68,7 @@ def _is_at_list_end(tokens: TokenStream) -> bool:
     """Whether the stretch of statements ends with the next token."""
     token = tokens.current
     if token.kind is _NAME:
-        return _replace_misspelt_end(tokens)
+        return not _starts_phrase(tokens) and _replace_misspelt_end(tokens)
     if token.kind is not _KEYWORD:
         return False
     if token.key in tokens.vocabulary.block_ends:
@@ -137,6 +143,8 @@ def statement(tokens: TokenStream) -> tree.Statement:
 def _statement_from_name(tokens: TokenStream, after: Token) -> tree.Statement:
     """Read a statement that begins with a name."""
     token = tokens.current
+    if _starts_phrase(tokens):
+        return tokens.rules[token.key](tokens)
     if after.key in ASSIGNMENT_SIGNS or after.key == "[":
         return tokens.rules["="](tokens)
     if after.key == "(" and tokens.peek(2).kind is not TokenKind.STRING:
@@ -186,7 +194,10 @@ def _report_no_statement(tokens: TokenStream) -> tree.Statement:
         advice = f"write `{token.text} = {token.text} {sign} ...`" if sign in ("+", "-", "*", "/") else ""
         text = f"`{token.text}` needs `=` and a value"
         tokens.fail(text, "a name alone is not a statement", code="E109", advice=advice)
-    advice = did_you_mean(FOREIGN_STATEMENTS.get(token.key)) or UNSUPPORTED_STATEMENTS.get(token.key, _BEGINNINGS)
+    phrase = f"{token.key} {STATEMENT_PHRASES[token.key]}" if token.key in STATEMENT_PHRASES else ""
+    advice = did_you_mean(FOREIGN_STATEMENTS.get(token.key) or phrase) or UNSUPPORTED_STATEMENTS.get(
+        token.key, _BEGINNINGS
+    )
     note = "line numbers are allowed only if the first line has one" if token.kind is _NUMBER else ""
     tokens.report("E105", text, token.span, label, note=note, advice=advice)
     raise PanicModeError
@@ -270,12 +281,18 @@ def _starts_statement(tokens: TokenStream) -> bool:
         return token.key in (*tokens.vocabulary.statements, *tokens.vocabulary.headers, "BEGIN")
     if token.kind is not _NAME and token.kind is not _ARM:
         return False
-    if after.key in ASSIGNMENT_SIGNS or not tokens.is_on_same_line():
+    if after.key in ASSIGNMENT_SIGNS or not tokens.is_on_same_line() or _starts_phrase(tokens):
         return True
     if after.key in ("(", "["):
         return after.key == "[" or token.key in tokens.procedures
     wrong = token.kind is _NAME and not _is_known(tokens, token)
     return wrong and closest(token.text, tokens.vocabulary.statements) is not None
+
+
+def _starts_phrase(tokens: TokenStream) -> bool:
+    """Whether two words stand here that start a statement together, though programs may use each as a name."""
+    after = tokens.peek()
+    return after.kind is _NAME and STATEMENT_PHRASES.get(tokens.current.key) == after.key
 
 
 def _is_known(tokens: TokenStream, token: Token) -> bool:

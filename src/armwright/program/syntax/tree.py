@@ -98,7 +98,14 @@ class ReadSystem(Node):
     arm: Mobile
 
 
-DeviceStatement: TypeAlias = Open | Grasp | Operate | ReadVisions | ReadSystem
+@attrs.frozen
+class ZeroForce(Node):
+    """``ZERO FORCE arm``."""
+
+    arm: Mobile
+
+
+DeviceStatement: TypeAlias = Open | Grasp | Operate | ReadVisions | ReadSystem | ZeroForce
 
 
 @attrs.frozen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -12,15 +13,16 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory, hold, join
-from armwright.physics.collisions import Collision, MoveCheck
-from armwright.physics.planner import PlannedPath
-from armwright.physics.wanted_contacts import PlannedMove
+from armwright.physics.planned_move import PlannedMove
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.move_diagnostics import collision_advice, collision_location, collision_message
 from armwright.program.vm.move_request import MoveRequest
-from armwright.program.vm.planned_paths import can_be_passed, replanned
 from armwright.program.vm.process import Motion, PendingStage, Process, Threat
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import Collision, MoveCheck
+    from armwright.physics.planner import PlannedPath
 
 # A motion that has so little left is over [s].
 _ROUNDING = 1e-9
@@ -33,7 +35,7 @@ def checked_stages(
     arm: str,
     planned: Sequence[tuple[PlannedStage, tuple[str, ...]]],
 ) -> list[PendingStage]:
-    """Return the stages of a MOVE that nothing is in the way of, with their clearances.
+    """Return the stages of a MOVE without collisions, with their clearances.
 
     Raises:
         RunError: the arm would run into something.
@@ -47,6 +49,8 @@ def checked_stages(
     collisions = machine.collisions
     if collisions is None:
         return stages
+    from armwright.program.vm.planned_paths import can_be_passed, replanned  # noqa: PLC0415 - of cells with bodies
+
     hand = machine.state.hands[arm]
     move = PlannedMove(
         arm=arm,
@@ -89,7 +93,7 @@ def _path_past(machine: Machine, speed: float, move: PlannedMove, stage: int, go
 
 
 def _with_failure(error: RunError, failure: str) -> RunError:
-    """Return an error that also says why no path past what is in the way was planned."""
+    """Return an error that also says why no path past the obstacle was planned."""
     notes = (*error.diagnostic.notes, f"no path past it was planned: {failure}")
     return RunError(attrs.evolve(error.diagnostic, notes=notes), error.tree, error.time)
 
@@ -108,7 +112,7 @@ def _hands(machine: Machine) -> dict[str, Array]:
 
 
 def _check(machine: Machine, move: PlannedMove, *, clearances: bool = True) -> MoveCheck:
-    """Look for what a motion of an arm runs into, from now on."""
+    """Check a motion of an arm for collisions, from now on."""
     collisions = machine.collisions
     assert collisions is not None  # noqa: S101 - asked for only then
     others, beside = _surroundings(machine, move.arm)
@@ -132,7 +136,7 @@ def _course(machine: Machine, arm: str) -> Trajectory:
 
 
 def _rest_of_stage(machine: Machine, arm: str) -> Trajectory | None:
-    """Return what is left of what an arm is doing; None where it is at rest."""
+    """Return the rest of the motion of an arm; None where it is at rest."""
     runs = machine.state.segments[arm]
     if not runs or machine.now - runs[-1].t0 >= runs[-1].duration - _ROUNDING:
         return None
@@ -140,7 +144,7 @@ def _rest_of_stage(machine: Machine, arm: str) -> Trajectory | None:
 
 
 def note_released(machine: Machine, held: dict[str, tuple[str, ...]]) -> None:
-    """Let the fingers touch the parts that they have just let go.
+    """Let the fingers touch the parts that they have just released.
 
     Args:
         machine: that runs the program.
@@ -177,7 +181,7 @@ def check_late_stage(machine: Machine, process: Process, motion: Motion) -> None
 
 
 def check_others(machine: Machine, stopped: str) -> None:
-    """See which arms under way would run into one that has been stopped, or is late; they are stopped too.
+    """Find the moving arms that would run into one that has been stopped, or is late; they are stopped too.
 
     What an arm that is being stopped runs over on its path was looked at before: its stop keeps to that path.
     """
@@ -197,7 +201,7 @@ def check_others(machine: Machine, stopped: str) -> None:
 
 
 def _rest_of_move(machine: Machine, motion: Motion, stages: Sequence[Trajectory]) -> PlannedMove:
-    """Return what is left of a MOVE under way, whose fingers and tool may touch what they may touch all the time."""
+    """Return the rest of a MOVE that is running, whose fingers and tool may touch what they may touch all the time."""
     on_force = any(guard.reads_force for guard in motion.guards)
     return PlannedMove(
         arm=motion.arm,

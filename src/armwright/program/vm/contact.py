@@ -131,7 +131,7 @@ def record_contact(machine: Machine, motion: Motion, tick: int | None = None) ->
 
 def contact_report(motion: Motion) -> tuple[str, dict[str, object]]:
     """Return what the trace says of the contact of a motion, and its facts [m] and [N]; nothing without one."""
-    depth, force = motion.deepest_contact
+    depth, force, _ = motion.deepest_contact
     if depth <= 0:
         return "", {}
     return f"; pressed {_depth_text(motion.deepest_contact)}", {"contact": {"depth": depth, "force": force}}
@@ -162,8 +162,8 @@ def stop_too_deep(machine: Machine, process: Process, motion: Motion) -> NoRetur
         helps = _speed_advice(motion, allowed / min_depth)
     elif min_depth is not None:
         notes.append(f"if it brakes from the first contact on, the depth is {min_depth * 1e3:.3g} mm")
-    into_plane = f"into the plane{_plane_height_text(machine)} deeper than {allowed * 1e3:g} mm"
-    message = f"`{machine.spelling(motion.moved)}` presses {into_plane}"
+    surface = _surface_text(machine, motion.deepest_contact)
+    message = f"`{machine.spelling(motion.moved)}` presses into {surface} deeper than {allowed * 1e3:g} mm"
     raise machine.error(process, "E404", message, motion.span, "this MOVE is stopped there", notes=notes, helps=helps)
 
 
@@ -186,18 +186,17 @@ def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
 
 
-def refuse_contact(machine: Machine, process: Process, motion: Motion, goal: str) -> NoReturn:
-    """Refuse a stage that would come down on the plane, or press too deep into it, where no ON looks out for that.
+def refuse_contact(machine: Machine, process: Process, motion: Motion, goal: str, pressed: PeakContact) -> NoReturn:
+    """Refuse a stage that would come down on something, or press too deep into it, where no ON looks out for that.
 
     Raises:
         RunError: always.
     """
-    plane = f"the plane{_plane_height_text(machine)}"
-    text = f"`{machine.spelling(motion.moved)}` would enter {plane} on its path to `{goal}`"
+    text = f"`{machine.spelling(motion.moved)}` would enter {_surface_text(machine, pressed)} on its path to `{goal}`"
     label, helps = "this MOVE has no ON that ends it at the contact", ["guard the motion: `ON FORCE(Z) > 10 DO HALT`"]
     raise machine.error(process, "E404", text, motion.span, label, helps=helps)
 
 
-def _plane_height_text(machine: Machine) -> str:
+def _surface_text(machine: Machine, pressed: PeakContact) -> str:
     plane = machine.cell.contact.height
-    return "" if plane is None else f" at z = {plane * 1e3:g} mm"
+    return pressed.body or ("the plane" if plane is None else f"the plane at z = {plane * 1e3:g} mm")

@@ -1,6 +1,8 @@
-"""OPEN, GRASP, OPERATE and READ."""
+"""OPEN, GRASP, OPERATE, READ and ZERO FORCE."""
 
 from collections.abc import Mapping
+
+import numpy as np
 
 from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Instruction, Op
@@ -74,10 +76,19 @@ def _read_system(machine: Machine, process: Process, step: Instruction) -> None:
     machine.record_effect(process, "READ", f"READ SYSTEM {arm}", step.span, arm=arm, data=data)
 
 
+def _zero_force(machine: Machine, process: Process, step: Instruction) -> None:
+    arm = machine.resolve_name(process, step.operands[0])
+    machine.claim_arm(process, arm, step.span)
+    force, torque = np.split(machine.hardware.zero_force(arm, machine.now), 2)
+    data = {"force": force.tolist(), "torque": torque.tolist()}
+    machine.record_effect(process, "ZERO", f"ZERO FORCE {arm}", step.span, arm=arm, data=data)
+
+
 HANDLERS: Mapping[Op, Handler] = {
     Op.OPEN: _move_fingers,
     Op.GRASP: _move_fingers,
     Op.OPER: _operate,
     Op.READV: _read_visions,
     Op.READS: _read_system,
+    Op.ZEROF: _zero_force,
 }

@@ -8,7 +8,8 @@ from armwright.program.vm.machine import Handler, Machine, jump_target
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
 from armwright.program.vm.process import ElementReference, Process
 
-_AXES = {"X": 0, "Y": 1, "Z": 2}
+# Components of a wrench: forces, then moments.
+_COMPONENTS = {"X": 0, "Y": 1, "Z": 2, "MX": 3, "MY": 4, "MZ": 5}
 # An index this near to a whole number is that number.
 _INTEGER_TOLERANCE = 1e-9
 
@@ -56,7 +57,7 @@ def _force(machine: Machine, process: Process, step: Instruction) -> None:
     arm = process.motion.arm if process.motion else process.last_arm
     value = 0.0
     if arm is not None:
-        value = float(machine.hardware.contact_force(arm, machine.now)[_AXES[str(step.operands[1])]])
+        value = float(machine.hardware.contact_wrench(arm, machine.now)[_COMPONENTS[str(step.operands[1])]])
     machine.write(process, step.operands[0], value, step.span)
 
 

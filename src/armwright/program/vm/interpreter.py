@@ -30,6 +30,8 @@ from armwright.program.vm.synchronization import deadlock_error
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
 _UNRECOVERABLE = ("E504", "E506")
+# A simulated world that has become unstable remains so: a program that retries would retry for ever.
+_RECOVERABLE_ONCE = "R607"
 # A time this part of a period before a tick is on it.
 _TICK_TOLERANCE = 1e-6
 
@@ -117,8 +119,16 @@ def advance(machine: Machine, process: Process) -> None:
             raise _mishap_error(machine, process, mishap)
         _advance(machine, process)
     except RunError as error:
-        if error.diagnostic.code in _UNRECOVERABLE or not recover(machine, process, error):
+        if not _is_recoverable(machine, error) or not recover(machine, process, error):
             raise _stopped_error(machine, error, process, process.last_arm) from None
+
+
+def _is_recoverable(machine: Machine, error: RunError) -> bool:
+    """Whether a TRY may go on after an error."""
+    code = error.diagnostic.code
+    if code != _RECOVERABLE_ONCE:
+        return code not in _UNRECOVERABLE
+    return not any(effect.kind == "ERROR" and effect.data.get("code") == code for effect in machine.state.effects)
 
 
 def _let_time_pass(machine: Machine, process: Process) -> Mishap | None:

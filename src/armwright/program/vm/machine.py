@@ -1,9 +1,11 @@
 """The state of a running program: clock, frames, values, processes, and what it has left so far."""
 
+from __future__ import annotations
+
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import attrs
 import numpy as np
@@ -14,7 +16,6 @@ from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.physics.collisions import CellCollisions
 from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -25,6 +26,9 @@ from armwright.program.vm.recording import Effect, EffectKind, Recording, sample
 from armwright.program.vm.state import MachineState
 from armwright.program.vm.value_text import value_text
 from armwright.spatial.poses import from_noap, to_noap
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import CellCollisions
 
 # A time this part of a period behind a tick is on it.
 _TICK_TOLERANCE = 1e-9
@@ -81,10 +85,12 @@ class Machine:
     def collisions(self) -> CellCollisions | None:
         """What arms may run into; None where there is nothing of the kind in the cell."""
         if self._collisions is None and self.cell.collisions_matter:
+            from armwright.physics.collisions import CellCollisions  # noqa: PLC0415 - of cells with bodies
+
             self._collisions = CellCollisions(self.cell)
         return self._collisions
 
-    def copy(self) -> "Machine":
+    def copy(self) -> Machine:
         """Return a machine in the same state; what one of them does changes nothing in the other.
 
         Raises:
@@ -96,7 +102,7 @@ class Machine:
         copied.hardware, copied.state = self.hardware.copy(), self.state.copy()
         return copied
 
-    def with_code(self, code: Code) -> "Machine":
+    def with_code(self, code: Code) -> Machine:
         """Return a machine that runs other code on the state and the hardware of this one."""
         other = copy.copy(self)
         other.code, other.constants = code, constant_values(code.constants)

@@ -286,9 +286,10 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     update_depth_alarm(machine, motion)
     touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
+        pressed = machine.hardware.peak_contact(motion.arm, machine.now + trajectory.duration)
         send_trajectory(machine, motion, hold(trajectory(0.0), period))
         motion.alarm_tick = None
-        refuse_contact(machine, process, motion, goal_names[-1])
+        refuse_contact(machine, process, motion, goal_names[-1], pressed)
     if touch is not None:
         motion.first_contact = (trajectory, touch - machine.now)
     motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(tau, period)

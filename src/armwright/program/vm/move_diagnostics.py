@@ -1,6 +1,9 @@
 """Obstacles of motions and their detours, in the words of the program: poses, causes, costs."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,11 +12,12 @@ from armwright.arrays import Array
 from armwright.errors import counted
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
-from armwright.physics.clearance import RESOLUTION
-from armwright.physics.collisions import Collision
-from armwright.physics.planner import PlannedPath
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import Collision
+    from armwright.physics.planner import PlannedPath
 
 CODES = {"reach": "E401", "limits": "E402", "singular": "E403"}
 _GOAL_MESSAGES = {
@@ -86,6 +90,8 @@ def collision_message(collision: Collision, goal: str, arm: str) -> str:
     where = "after it has arrived" if collision.at_rest else f"{collision.fraction * 100:.0f} % of the way there"
     meets = f"{other} would hit {own}" if collision.at_rest else f"{own} would hit {other}"
     if collision.depth <= 0:
+        from armwright.physics.clearance import RESOLUTION  # noqa: PLC0415 - of few runs
+
         near = f"nearer than {RESOLUTION * 1e3:g} mm, which counts as a hit"
         return f"`{goal}` cannot be reached by {arm} on this path: {own} would come to {other} {where}, {near}"
     return f"`{goal}` cannot be reached by {arm} on this path: {meets} {where}, {deep}"
@@ -95,7 +101,7 @@ def collision_location(collision: Collision) -> list[str]:
     """Return where in the world and when an arm would run into something, and what is known of the solids."""
     own, other = collision.bodies
     when = "" if collision.at_start else f", {collision.time:.3f} s after this MOVE begins"
-    notes = [f"at {_position(collision.place)} mm in the world{when}"]
+    notes = [f"at {_position(collision.point)} mm in the world{when}"]
     if collision.guessed:
         notes.append(f"the shape of {own} or {other} is a guess: the arm file has no exact solid of it")
     return notes
@@ -118,7 +124,6 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
     if clearance is None or clearance.distance is None or clearance.distance >= wanted:
         return None
     own, other = clearance.bodies
-    place = np.array(clearance.place)
     return Diagnostic(
         code="W404",
         severity=Severity.WARNING,
@@ -126,7 +131,7 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
         f"`{run.goal_names[-1]}`",
         span=run.span,
         label=f"at {run.t0 + clearance.time:.3f} s; the cell wants {wanted * 1e3:g} mm",
-        notes=(f"at {_position(place)} mm in the world",),
+        notes=(f"at {_position(np.array(clearance.point))} mm in the world",),
         helps=("a path farther away, by VIA, or a smaller `clearance_mm` under [motion] of the cell",),
     )
 

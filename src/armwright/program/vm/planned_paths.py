@@ -17,8 +17,8 @@ from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.plan import PlannedStage, tool_path_length
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.collisions import Collision, MoveCheck
+from armwright.physics.planned_move import PlannedMove
 from armwright.physics.planner import PlannedPath, PlanningError
-from armwright.physics.wanted_contacts import PlannedMove
 from armwright.program.vm.machine import Machine
 
 # Configurations nearer than this are the same [rad] or [m].
@@ -59,7 +59,7 @@ def replanned(
         move: the MOVE.
         stages: its stages.
         plan: plans a path instead of a stage to one of several configurations.
-        check: looks for what a MOVE runs into.
+        check: finds what a MOVE runs into.
         fixed_duration: whether no stage may take longer than it does.
     """
     done = Replanned(move, stages, {}, check(move))

@@ -1,7 +1,9 @@
 """What a running program consists of: processes, the procedures they are in, the motions they make."""
 
+from __future__ import annotations
+
 import enum
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -10,10 +12,12 @@ from armwright.arrays import Array
 from armwright.cell.hardware import PeakContact
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
-from armwright.physics.collisions import Collision, StageClearance
-from armwright.physics.planner import PlannedPath
 from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import Collision, StageClearance
+    from armwright.physics.planner import PlannedPath
 
 
 @attrs.frozen
@@ -85,7 +89,7 @@ class Activation:
     local_slots: tuple[str, ...] = ()
     lock_count: int = 0
 
-    def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> "Activation":
+    def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> Activation:
         """Return the activation of a condition or an action, which has the names of this one."""
         names, temporaries, spans = self.bindings, self.temporaries, self.temporary_spans
         return Activation(kind=kind, bindings=names, temporaries=temporaries, temporary_spans=spans, **fields)
@@ -131,7 +135,7 @@ class PendingStage(NamedTuple):
 
 
 class Threat(NamedTuple):
-    """What a MOVE under way would run into, because another arm was stopped.
+    """What a running MOVE would run into, because another arm was stopped.
 
     Attributes:
         tick: when that was [ticks].
@@ -203,7 +207,7 @@ class Motion:
     first_contact: tuple[Trajectory, float] | None = None
     deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
     paths: tuple[PlannedPath, ...] = ()
-    early_end: "EarlyEnd | None" = None
+    early_end: EarlyEnd | None = None
 
     @property
     def trace_text(self) -> str:
@@ -290,14 +294,14 @@ class Process:
     pc: int = 0
     wake_tick: int = 0
     stack: list[Activation] = attrs.field(factory=lambda: [Activation(kind="main")])
-    parent: "Process | None" = None
+    parent: Process | None = None
     waiting: WaitReason | None = None
     unfulfilled_wait: WaitReason | None = None
     motion: Motion | None = None
     pending_effect: PendingEffect | None = None
     last_arm: str | None = None
     locks: list[str] = attrs.field(factory=list)
-    branches: list["Process"] = attrs.field(factory=list)
+    branches: list[Process] = attrs.field(factory=list)
     done: bool = False
 
     @property
@@ -326,6 +330,6 @@ class Process:
             return None
         return motion
 
-    def descends_from(self, other: "Process") -> bool:
+    def descends_from(self, other: Process) -> bool:
         """Whether another process began this one, directly or through others, or is this one."""
         return self.path[: len(other.path)] == other.path

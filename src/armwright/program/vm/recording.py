@@ -1,8 +1,10 @@
 """What a run leaves: every effect with its location in the program, every stage, every servo tick of every arm."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -18,11 +20,13 @@ from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
-from armwright.physics.collisions import CheckedBodies, StageClearance
-from armwright.physics.planner import PlannedPath
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
+
+if TYPE_CHECKING:
+    from armwright.physics.collisions import CheckedBodies, StageClearance
+    from armwright.physics.planner import PlannedPath
 
 # Rows that are computed and written together.
 _CHUNK_ROWS = 16384
@@ -32,7 +36,7 @@ _TICK_TOLERANCE = 1e-6
 # Of statements that take time, and take effect at its end.
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
 _MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP"]
-EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
+EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
 # Not of the trace: assignments, locks and the end of the text.
 _SILENT = ("PLACE", "LOCK", "END")
 

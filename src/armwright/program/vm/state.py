@@ -22,7 +22,7 @@ class Hand:
     Attributes:
         reached_frame: where it arrived.
         held_frame: what they closed on.
-        beside: the parts that they may touch: those that they went to, or let go.
+        beside: the parts that they may touch: those that they went to, or released.
         pressed: whether a force ends, or ended, its latest MOVE, so that it may press on something.
     """
 

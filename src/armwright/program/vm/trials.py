@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from hashlib import sha256
 from typing import Any
 
 import attrs
+import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.physics.trials import Case, Verdict, draw_case, judge
 from armwright.physics.world import PhysicsCell
+from armwright.program.bytecode.assembler import assembly
 from armwright.program.bytecode.instructions import Code
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import Limits, RunError
@@ -46,14 +50,20 @@ class ProgramTrials:
     @property
     def settings(self) -> Mapping[str, Any]:
         """The other inputs of the results."""
-        return {"seed": self.seed, "limits": attrs.asdict(self.limits), **self.identity}
+        return {
+            "seed": self.seed,
+            "limits": attrs.asdict(self.limits),
+            "code": _hash(assembly(self.code)),
+            "cell": cell_hashes(self.cell),
+            **self.identity,
+        }
 
     @property
     def outputs(self) -> Mapping[str, Output]:
         """How a trial ended; its cause of failure is its message."""
         return {
             "distance": Output(description="of the part that is farthest from its goal", units="m"),
-            "angle": Output(description="of the part that is turned most from its goal", units="rad"),
+            "angle": Output(description="of the part that is rotated farthest from its goal", units="rad"),
             "duration": Output(description="until the program ended", units="s"),
             "ended": Output(description="1 where the program has come to its end, 0 where an error ended it"),
         }
@@ -86,6 +96,36 @@ class ProgramTrials:
             "ended": float(error is None),
             FAILURE: failure,
         }
+
+
+def cell_hashes(cell: Cell) -> dict[str, Any]:
+    """Return the hashes of what a cell has, by its fields and names: of meshes and arms too, which are in other files.
+
+    Cells of which these are equal are equal.
+    """
+    hashes: dict[str, Any] = {}
+    for field in attrs.fields(Cell):
+        value = getattr(cell, field.name)
+        by_name = isinstance(value, Mapping)
+        hashes[field.name] = {name: _hash(entry) for name, entry in value.items()} if by_name else _hash(value)
+    return hashes
+
+
+def _hash(value: Any) -> str:
+    return sha256(json.dumps(value, default=_as_data).encode()).hexdigest()
+
+
+def _as_data(value: Any) -> Any:
+    """Return what JSON does not hold as data that are others for another value."""
+    match value:
+        case np.ndarray():
+            return [value.dtype.str, value.shape, sha256(value.tobytes()).hexdigest()]
+        case Mapping():
+            return dict(value)
+        case frozenset():
+            return sorted(value)
+        case _:
+            return [type(value).__name__, *(getattr(value, field.name) for field in attrs.fields(type(value)))]
 
 
 def judge_run(world: PhysicsCell, case: Case, duration: float, error: RunError | None) -> Verdict:

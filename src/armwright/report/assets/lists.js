@@ -142,7 +142,7 @@ function clearanceCell({ clearance }) {
     event.stopPropagation();
     seek(t);
   });
-  const said = make("span", { className: "quiet", textContent: `${bodies.join(" – ")}, ${number(t, 2)} s` });
+  const said = make("span", { className: "quiet", textContent: `${bodies.join(" – ")}, ${number(t, 2)}\u00a0s` });
   return make("td", { className: distance < data.clearance || distance <= 0 ? "over near" : "near" }, link, said);
 }
 

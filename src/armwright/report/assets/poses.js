@@ -21,9 +21,9 @@ function change({ frame, slide, stretches }, figure, q, place) {
   return X;
 }
 
-// The frames 0 to n of an arm, and last its tool, in the world.
-function framesOf(figure, place) {
-  const q = blend(figure.q, place);
+// The frames 0 to n of an arm, and last its tool, in the world, at measured or planned joint positions.
+function framesOf(figure, place, positions = figure.q) {
+  const q = blend(positions, place);
   const frames = [figure.base];
   figure.joints.forEach((joint, i) => {
     const [turn, shift] = joint.revolute ? [q[i], 0] : [0, q[i]];
@@ -35,6 +35,12 @@ function framesOf(figure, place) {
 
 function gripOf(figure, [i, j, s]) {
   return figure.grip[i] + s * (figure.grip[j] - figure.grip[i]);
+}
+
+// Where a part is in the world, or on the hand that holds it: at its last pose, or on the way to the next one.
+function partPose({ times, poses, changes_evenly }, last, t) {
+  if (!changes_evenly || last + 1 === times.length) return poses[last];
+  return blend(poses, [last, last + 1, Math.max(0, (t - times[last]) / (times[last + 1] - times[last]))]);
 }
 
 // All bodies at t: name, pose in the world, number of the shape, and what colours it.
@@ -50,7 +56,7 @@ function bodiesAt(t) {
       part.times.findLastIndex((time) => time <= t + HAIR),
     );
     const arm = part.arms[last];
-    const pose = arm === null ? part.poses[last] : compose(tools[arm], part.poses[last]);
+    const pose = arm === null ? partPose(part, last, t) : compose(tools[arm], part.poses[last]);
     bodies.push({ name: part.name, shape: part.shape, pose, tint: "part", whose, arm });
   });
   arms.forEach(([_, figure, frames], whose) => {

@@ -50,21 +50,26 @@ function showReadout() {
   const arm = chosenArm();
   const place = arm && presentRow(arm);
   if (!place) return;
-  const q = blend(arm.q, place);
+  // What is measured is drawn, and so it is what is told.
+  const q = arm.measured ? blend(arm.measured.q, locate(arm.measured.t, now.t)) : blend(arm.q, place);
   [...byId("joints").children].forEach((row, j) => {
     row.children[1].textContent = quantityText(QUANTITIES[0], arm.joints[j], q[j]);
     const part = share(QUANTITIES[0], arm.joints[j], q[j]);
     if (part !== null) row.children[2].firstChild.style.left = `${Math.min(100, Math.max(0, 50 + 50 * part))}%`;
   });
   const figure = data.animation?.arms[arm.name];
-  const parts = [["hand", `${placeText(blend(arm.hand, place))} mm`]];
-  if (figure) parts.push(["gripper", gripText(gripOf(figure, locate(data.animation.t, now.t)))]);
+  const instant = figure && locate(data.animation.t, now.t);
+  const hand = arm.measured && figure ? framesOf(figure, instant).at(-1).slice(9) : blend(arm.hand, place);
+  const parts = [["hand", `${placeText(hand)} mm`]];
+  if (figure) parts.push(["gripper", gripText(gripOf(figure, instant), arm.measured && figure.opening)]);
   byId("hand").replaceChildren(
     ...parts.map(([name, text]) => make("div", {}, make("span", { textContent: name }), text)),
   );
 }
 
-function gripText(grip) {
+// Fingers whose opening [m] was measured, or is known to be a share of the largest.
+function gripText(grip, opening) {
+  if (opening) return `${number(grip * opening * MILLIMETRES, 1)} mm open`;
   return grip > 0.99 ? "open" : grip < 0.01 ? "closed" : `${number(100 * grip, 0)} % open`;
 }
 
@@ -89,7 +94,7 @@ function chooseArm(i) {
       button.ariaPressed = String(k === i);
     });
   byId("joints").replaceChildren(...arm.joints.map(jointRow));
-  byId("readout-name").textContent = `Joints of ${arm.name}`;
+  byId("readout-name").textContent = `Joints of ${arm.name}${arm.measured ? ", measured" : ""}`;
   chooseArmInCharts();
   changed();
 }

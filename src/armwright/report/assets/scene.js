@@ -6,7 +6,8 @@ function unpack() {
     for (const key of ["q", "qd", "tau", "error"]) if (arm.measured) arm.measured[key] = expand(arm.measured[key]);
   }
   if (!data.animation) return;
-  for (const figure of Object.values(data.animation.arms)) figure.q = expand(figure.q);
+  for (const figure of Object.values(data.animation.arms))
+    for (const key of ["q", "planned"]) figure[key] = expand(figure[key]);
   for (const frame of data.animation.frames) frame.poses = expand(frame.poses);
 }
 unpack();

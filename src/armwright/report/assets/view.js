@@ -18,6 +18,8 @@ function coloredPath(arm) {
   return pieces;
 }
 
+let plannedShown = true;
+
 const paths = data.arms.map(coloredPath);
 
 function armColour(i) {
@@ -119,6 +121,19 @@ function paintPath(pieces, shown) {
   }
 }
 
+// Where an arm was to be, as lines through the origins of its frames: in front of all bodies where the arm is visibly
+// elsewhere, faint inside them otherwise.
+const VISIBLE = 2e-3;
+
+function paintPlanned(figure, frames, place) {
+  const points = framesOf(figure, place, figure.planned).map((X) => X.slice(9));
+  const apart = points.some((point, i) => length(plus(point, frames[i].slice(9), -1)) > VISIBLE);
+  points.slice(1).forEach((point, i) => {
+    if (apart) stroke(project(points[i]), project(point), colours.accent, 2.6, 0.85);
+    else strokeBehind(points[i], point, colours.accent, 2, 0.75);
+  });
+}
+
 function paintFloor() {
   const step = roundStep(scenery.size, 9);
   const [low, high] = [
@@ -188,6 +203,7 @@ function drawView() {
     paintPath(pieces, i === now.arm);
   });
   paintFrames(place);
+  if (plannedShown) for (const [_, figure, frames] of arms) if (figure.planned) paintPlanned(figure, frames, place);
   for (const [_, __, frames] of arms) paintHand(frames.at(-1).slice(9));
   nameBodies(bodies, arms);
   paintLabels();
@@ -197,6 +213,18 @@ function look(name) {
   Object.assign(camera, LOOKS[name]);
   fit();
   drawView();
+}
+
+// A button for the planned arm, where the view draws a measured one.
+function startPlanned() {
+  const button = document.getElementById("planned");
+  const measured = Object.values(data.animation?.arms ?? {}).some((figure) => figure.planned);
+  document.getElementById("planned-choice").hidden = !measured;
+  button.addEventListener("click", () => {
+    plannedShown = !plannedShown;
+    button.ariaPressed = String(plannedShown);
+    drawView();
+  });
 }
 
 function startView() {
@@ -234,6 +262,7 @@ function startView() {
   );
   for (const button of document.querySelectorAll("[data-camera]"))
     button.addEventListener("click", () => look(button.dataset.camera));
+  startPlanned();
   document.getElementById("view-empty").hidden = Boolean(data.animation);
   if (data.animation) fit();
 }

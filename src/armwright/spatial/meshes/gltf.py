@@ -90,16 +90,16 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
     if length != len(data):
         raise FileFormatError(path, None, "", f"expected the {length:,} bytes announced, got {len(data):,}")
     chunks: dict[bytes, bytes] = {}
-    at = _HEADER
-    while at < len(data):
-        size, kind = int.from_bytes(data[at : at + 4], "little"), data[at + 4 : at + _CHUNK_HEADER]
-        at += _CHUNK_HEADER
-        if size > len(data) - at:
+    offset = _HEADER
+    while offset < len(data):
+        size, kind = int.from_bytes(data[offset : offset + 4], "little"), data[offset + 4 : offset + _CHUNK_HEADER]
+        offset += _CHUNK_HEADER
+        if size > len(data) - offset:
             raise FileFormatError(path, None, "", f"a chunk of {size:,} bytes goes beyond the end of the file")
         # Chunks of other kinds are skipped; of JSON and BIN there is one each, the first.
         if kind in {b"JSON", b"BIN\x00"}:
-            chunks.setdefault(kind, data[at : at + size])
-        at += size
+            chunks.setdefault(kind, data[offset : offset + size])
+        offset += size
     if b"JSON" not in chunks:
         raise FileFormatError(path, None, "", "expected a chunk of JSON, got none")
     return chunks[b"JSON"], chunks.get(b"BIN\x00")

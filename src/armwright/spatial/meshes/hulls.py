@@ -1,10 +1,10 @@
-"""Convex hulls of meshes, which take their place in collisions, and where they lie."""
+"""Convex hulls of meshes, which replace them in collisions, and where the hulls differ much."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from armwright.errors import counted
+from armwright.errors import counted, listed
 from armwright.spatial.shapes import Mesh, Shape, collision_shapes, is_closed, open_edges, volume
 
 # Hulls up to so many times the volume of a mesh are near enough to it.
@@ -38,14 +38,9 @@ def hull_messages(bodies: Iterable[tuple[str, Shape]]) -> list[str]:
     messages = []
     if larger:
         messages.append(
-            f"in collisions, convex hulls take the place of meshes, and some are much larger: {_listed(larger)}; "
-            "name convex pieces of such a mesh as its pieces"
+            f"in collisions, convex hulls replace meshes, and some are much larger: "
+            f"{listed(larger, _MAX_LISTED)}; name convex pieces of such a mesh as its pieces"
         )
     if unclosed:
-        messages.append(f"meshes that are not closed are taken as their convex hulls: {_listed(unclosed)}")
+        messages.append(f"meshes that are not closed are taken as their convex hulls: {listed(unclosed, _MAX_LISTED)}")
     return messages
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - _MAX_LISTED:,} more" if len(names) > _MAX_LISTED else ""
-    return f"{', '.join(names[:_MAX_LISTED])}{more}"

@@ -44,10 +44,10 @@ def read_mesh(path: Path | str, *, unit: str | None = None, scale: Sequence[floa
     """Return the solid in an STL, OBJ, glTF or STEP file.
 
     Corners at one point become one vertex, triangles without an area between different vertices are dropped, and the
-    triangles of a closed mesh are turned so that they are seen counterclockwise from outside. An assembly is one mesh.
+    triangles of a closed mesh are oriented: counterclockwise as seen from outside. An assembly is one mesh.
 
     Args:
-        path: the file; the ending of its name tells its format.
+        path: the file; the ending of its name is its format.
         unit: ``m``, ``mm``, ``cm`` or ``in``, required for STL and OBJ; glTF is in metres, and STEP has its unit.
         scale: factors of x, y and z, as URDF has them.
 

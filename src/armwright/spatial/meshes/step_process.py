@@ -1,4 +1,4 @@
-"""A process of its own that turns a STEP file into glTF: limits on its memory and time cannot harm another then.
+"""A process of its own that converts a STEP file to glTF: limits on its memory and time cannot harm another then.
 
 It is started as a script and knows nothing of armwright. The file comes in by the standard input, binary glTF goes out
 by the standard output.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from armwright.errors import MissingExtraError
 from armwright.extras import import_extra
 
-# The environment variable by which MuJoCo is told of one.
+# The environment variable that names one for MuJoCo.
 VARIABLE = "MUJOCO_GL"
 
 
@@ -42,9 +42,9 @@ def load_mujoco() -> Any:
     try:
         return importlib.import_module("mujoco")
     except (ImportError, AttributeError, RuntimeError) as error:
-        wanted = _wanted()
-        if wanted and not _is_whole(wanted):
-            raise _missing(wanted) from error
+        requested = _requested()
+        if requested and not _is_whole(requested):
+            raise _missing(requested) from error
         raise MissingExtraError(f"MuJoCo cannot be loaded: {' '.join(str(error).split())}") from error
 
 
@@ -55,20 +55,20 @@ def graphics() -> Graphics:
         MissingExtraError: a package or a library of the system is missing, or the variable names something else.
     """
     import_extra("OpenGL", "drawing pictures", "physics", "PyOpenGL")
-    wanted = _wanted()
-    for name in [wanted] if wanted else _LIBRARIES:
+    requested = _requested()
+    for name in [requested] if requested else _LIBRARIES:
         if _is_whole(name):
             os.environ.setdefault(VARIABLE, name)
             return Graphics(name, _context(name))
-    raise _missing(wanted or "egl")
+    raise _missing(requested or "egl")
 
 
-def _wanted() -> str:
+def _requested() -> str:
     """Return the OpenGL that the environment names; an empty text where it names none."""
-    wanted = os.environ.get(VARIABLE, "").strip().lower()
-    if wanted and wanted not in _LIBRARIES:
-        raise MissingExtraError(f"{VARIABLE}: expected egl or osmesa, which draw without a screen, got {wanted!r}")
-    return wanted
+    requested = os.environ.get(VARIABLE, "").strip().lower()
+    if requested and requested not in _LIBRARIES:
+        raise MissingExtraError(f"{VARIABLE}: expected egl or osmesa, which draw without a screen, got {requested!r}")
+    return requested
 
 
 def _missing(name: str) -> MissingExtraError:
