@@ -146,6 +146,8 @@ deviation_mm = 0.5
 around = "via"
 [frames]
 "Table" = {IDENTITY}
+[joint_targets.home]
+joint_positions = [0, 0.6, 0.6, 0, 0.6, 0]
 """
     place = cell(tmp_path, text)
     arm = place.arms["ARM_2"]
@@ -154,6 +156,9 @@ around = "via"
     assert place.around == "via"
     assert (arm.arm.name, arm.open_time, arm.grasp_time, arm.arm.tool[2, 3]) == ("puma560", 0.25, 0.5, 0.12)
     assert place.devices == {"PRESS", "LAMP"}
+    assert list(place.joint_targets) == ["HOME"]
+    assert place.joint_targets["HOME"].arm == "ARM_2"
+    np.testing.assert_array_equal(place.joint_targets["HOME"].q, (0, 0.6, 0.6, 0, 0.6, 0))
     assert place.contact.height == -0.1
     assert place.camera[2, 3] == 2
     np.testing.assert_allclose(place.tree().world("ARM_2"), forward(arm.arm, arm.start))
@@ -299,6 +304,21 @@ FAULTS = {
         '[arms.ARM_1]\nmodel = "ur5"\njoint_positions = [10, -90, 90, -90, -90, 0]\n',
         3,
         "arms, ARM_1, joint_positions: joint 1",
+    ),
+    "joint target beyond a limit": (
+        ARM + "[joint_targets.HOME]\njoint_positions = [0, 0, 1.2, 0, 0, 0]\n",
+        5,
+        "joint_targets, HOME, joint_positions: joint 3 would be at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
+    ),
+    "joint target of no arm": (
+        ARM + "[joint_targets.HOME]\narm = 'ARM_3'\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n",
+        5,
+        "joint_targets, HOME, arm: ARM_3 is not an arm of the cell; did you mean ARM_1?",
+    ),
+    "joint target with the name of a frame": (
+        ARM + "[frames]\nA = [1,0,0, 0,1,0, 0,0,1, 0,0,0]\n[joint_targets.a]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n",
+        6,
+        "joint_targets, a: A is a frame of the cell already",
     ),
     "key without its unit": (
         ARM + "[motion]\ncorner = 3\n",

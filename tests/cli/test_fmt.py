@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from armwright.cli.source_files import read_source, write_back
+from armwright.cli.source_files import read_source
 from armwright.errors import OutputError
+from armwright.files.output import write_back
 from cli_calls import armwright, fed_to
 
 WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
@@ -46,7 +47,7 @@ def test_ends_of_lines(written: Path, mark: bytes, end: bytes) -> None:
     """Lines go on to end as they did, and a mark of byte order stays, whether fmt or fix has changed them."""
     written.write_bytes(mark + b"begin open arm-1 ;\n{ now } grasp\nend.\n".replace(b"\n", end))
 
-    write_back(read_source(written), written, LAID_OUT)
+    write_back(written, read_source(written).text, LAID_OUT)
 
     assert written.read_bytes() == mark + LAID_OUT.encode().replace(b"\n", end)
     assert read_source(written).text == LAID_OUT
@@ -104,7 +105,7 @@ def test_changed_meanwhile(written: Path) -> None:
     written.write_text(f"{WRITTEN}{{ mine }}")
 
     with pytest.raises(OutputError, match="it has changed since it was read; nothing was written"):
-        write_back(source, written, LAID_OUT)
+        write_back(written, source.text, LAID_OUT)
     assert written.read_text().endswith("{ mine }")
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.reader import read_cell
-from armwright.errors import UnknownNameError
+from armwright.errors import OutputError, UnknownNameError
 from armwright.studio.cell_file import CellFile, TeachingError
 from oracles.arms import random_pose
 from samples import Sample
@@ -43,6 +43,24 @@ def test_taught_frames(file: CellFile, sample: Sample) -> None:
         tree = read_cell(file.path).tree()
         for name in (f"P{number}", f"Q{number}"):
             np.testing.assert_allclose(tree.world(name), X, atol=2e-7)
+
+
+def test_joint_targets(file: CellFile, sample: Sample) -> None:
+    """Joint targets are where they were taught, also at limits; they are renamed and forgotten like frames."""
+    limits = file.cell.arms["ARM_1"].arm.limits
+    lower, upper = np.maximum(limits.lower, -3.0), np.minimum(limits.upper, 3.0)
+    for number, rng in enumerate(sample.cases(100)):
+        q = np.where(rng.random(6) < 0.2, upper, rng.uniform(lower, upper))
+        file.teach_joints(f"j{number}", "ARM_1", q)
+        file.save()
+        np.testing.assert_allclose(read_cell(file.path).joint_targets[f"J{number}"].q, q, atol=1e-7)
+    file.rename("J0", "home")
+    with pytest.raises(TeachingError, match="HOME is taken already"):
+        file.rename("FEEDER", "Home")
+    with pytest.raises(TeachingError, match="HOME is a frame of the cell already"):
+        file.teach("HOME", np.eye(4))
+    file.forget("HOME")
+    assert "HOME" not in file.cell.joint_targets
 
 
 def test_all_else_stays(file: CellFile) -> None:
@@ -87,11 +105,11 @@ def test_refused(file: CellFile, tmp_path: Path) -> None:
     """Unknown frames, names that are taken, JSON, and files that somebody else has changed."""
     with pytest.raises(UnknownNameError, match="FEEDER"):
         file.rename("FEDER", "X")
-    with pytest.raises(TeachingError, match="there is a frame ABOVE already"):
+    with pytest.raises(TeachingError, match="ABOVE is taken already"):
         file.rename("FEEDER", "above")
     file.teach("NEW", np.eye(4))
     file.path.write_text(TEXT + "# by another program\n")
-    with pytest.raises(TeachingError, match="changed by another program"):
+    with pytest.raises(OutputError, match="changed since it was read"):
         file.save()
     assert file.path.read_text().endswith("# by another program\n")
     other = tmp_path / "cell.json"

@@ -1,5 +1,6 @@
 """A studio without a browser: what its commands do, and which page may send them."""
 
+import base64
 import json
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,12 @@ import pytest
 
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
+from armwright.files.inputs import read_program
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.api import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.studio.cell_file import CellFile
+from armwright.studio.program_text import ProgramText
 from armwright.studio.project import Project
 from armwright.studio.studio import Studio
 from armwright.studio.workbench import Workbench
@@ -128,7 +132,7 @@ def test_undo(pages: Pages) -> None:
     for value in (0.1, 0.2, 0.3):
         pages.send("joint", arm="ARM_1", joint=1, value=value)
     pages.now += 1.0
-    pages.send("go to", arm="ARM_1", frame="LOW")
+    pages.send("go to", arm="ARM_1", name="LOW")
     assert pages.send("undo") == ""
     assert pages.studio.workbench.arms["ARM_1"].q[0] == 0.3
     pages.send("undo")
@@ -145,7 +149,7 @@ def test_wrong_commands(pages: Pages) -> None:
     assert pages.send("tool", arm="ARM_1", pose=[1.0] * 12) != ""
     assert pages.send("tool", arm="ARM_1", pose=[1.0] * 3) != ""
     assert "did you mean jog" in pages.send("jogg")
-    assert "HIGH" in pages.send("go to", arm="ARM_1", frame="HIHG")
+    assert "HIGH" in pages.send("go to", arm="ARM_1", name="HIHG")
     assert "share" in pages.send("jog", arm="ARM_1", frame="TOOL", axis=0, way=1, share=0.0)
     assert pages.state()["arms"] == before
 
@@ -181,7 +185,7 @@ def test_teach_and_insert(pages: Pages) -> None:
     taught = pages.tool
     assert pages.send("insert", arm="ARM_1", frame="pick", line=4, straight=True, speed=40.0) == ""
     state = pages.state()
-    lines = state["program"]["source"].splitlines()
+    lines = state["source"].splitlines()
     assert lines[1] == "VAR low, high, PICK : FRAME ;"
     assert lines[4] == "  MOVE ARM_1 TO PICK STRAIGHTLY, WITH SPEED = 40 ;"
     assert state["program"]["runs"]
@@ -201,13 +205,77 @@ def test_teach_and_insert(pages: Pages) -> None:
     assert "Q" not in pages.file.cell.frames
 
 
+@pytest.mark.parametrize(
+    ("fields", "statement"),
+    [
+        ({}, "MOVE ARM_1 TO PICK ;"),
+        ({"straight": True}, "MOVE ARM_1 TO PICK STRAIGHTLY ;"),
+        ({"approach": 0.05}, "MOVE ARM_1 TO PICK WITH APPROACH = PICK * XYZ(0, 0, -50mm) ;"),
+        (
+            {"departure": 0.02, "speed": 40},
+            "MOVE ARM_1 TO PICK WITH DEPARTURE = ARM_1 * XYZ(0, 0, -20mm), WITH SPEED = 40 ;",
+        ),
+    ],
+)
+@pytest.mark.parametrize("units", ["", "UNITS MM ;\n"])
+def test_forms(tmp_path: Path, fields: dict[str, Any], statement: str, units: str) -> None:
+    """Each form of a MOVE is inserted, and makes the motion that is meant, in any units."""
+    pages = Pages(tmp_path, program=units + PROGRAM.partition("\n")[2].replace("  MOVE ARM_1 TO LOW ;\n", ""))
+    pages.send("tool", arm="ARM_1", pose=[1, 0, 0, 0, -1, 0, 0, 0, -1, 0.5, 0.1, 0.2], leaping=True)
+    taught = pages.tool
+    line = 3 + bool(units)
+    assert pages.send("insert", arm="ARM_1", frame="pick", line=line, **fields) == ""
+    text = pages.state()["source"]
+    assert statement in text
+    compiled = compile_program(pages.studio.project.program.compiled.source, pages.file.cell)
+    recording = interpret(compiled.code, pages.file.cell, Simulator(pages.file.cell))
+    source = pages.studio.project.program.compiled.source
+    stages = [it for it in recording.stages if source.line(it.span.start) == line + 1]
+    assert ("LINE" in {it.stage.kind for it in stages}) == bool(fields)
+    arm, last = pages.file.cell.arms["ARM_1"], stages[-1]
+    end = recording.streams[0].q[round((last.t0 + last.motion.duration) / pages.file.cell.period)]
+    np.testing.assert_allclose(arm.base @ forward(arm.arm, end), taught, atol=1e-6)
+
+
+def test_via(pages: Pages) -> None:
+    """Frames are put into the VIA of a MOVE, in order; what cannot be combined is refused, and nothing is taught."""
+    for number, value in enumerate((0.1, 0.2)):
+        pages.send("joint", arm="ARM_1", joint=1, value=value)
+        assert pages.send("via", arm="ARM_1", frame=f"v{number}", line=5, blend=0.01 * number) == ""
+    text = pages.state()["source"]
+    assert text.splitlines()[1] == "VAR low, high, V0, V1 : FRAME ;"
+    assert text.splitlines()[4] == "  MOVE ARM_1 TO HIGH VIA (V0, V1), WITH BLEND = 10mm ;"
+    assert pages.state()["program"]["runs"]
+
+    pages.send("text", text=text.replace("TO LOW", "TO LOW STRAIGHTLY"), version=2)
+    assert "STRAIGHTLY, which cannot be combined" in pages.send("via", arm="ARM_1", frame="W", line=4)
+    assert "no MOVE in line 1" in pages.send("via", arm="ARM_1", frame="W", line=1)
+    assert "W" not in pages.file.cell.frames
+    pages.send("text", text=text.replace("TO LOW", "TO LOW, WITH SPEED = 50"), version=3)
+    assert pages.send("via", arm="ARM_1", frame="W", line=4) == ""
+    assert "MOVE ARM_1 TO LOW VIA (W), WITH SPEED = 50 ;" in pages.state()["source"]
+
+
+def test_joint_targets(pages: Pages) -> None:
+    """An arm goes back to a joint target, which is shown before."""
+    q = pages.studio.workbench.arms["ARM_1"].q.copy()
+    assert pages.send("teach joints", arm="ARM_1", name="home") == ""
+    pages.send("joint", arm="ARM_1", joint=1, value=0.5)
+    pages.send("preview", arm="ARM_1", name="HOME")
+    np.testing.assert_allclose(pages.state()["ghost"]["q"], q, atol=1e-6)
+    assert pages.send("go to", arm="ARM_1", name="HOME") == ""
+    np.testing.assert_allclose(pages.studio.workbench.arms["ARM_1"].q, q, atol=1e-6)
+    assert pages.send("forget", name="HOME") == ""
+    assert pages.state()["targets"] == {}
+
+
 def test_a_program_from_nothing(tmp_path: Path) -> None:
     """MOVEs are inserted into an empty program."""
     pages = Pages(tmp_path, program="")
     for number, value in enumerate((0.0, 0.3, 0.5)):
         pages.send("joint", arm="ARM_1", joint=1, value=value)
         assert pages.send("insert", arm="ARM_1", frame=f"P{number}", line=100) == ""
-    text = pages.state()["program"]["source"]
+    text = pages.state()["source"]
     assert (
         text
         == "VAR P0, P1, P2 : FRAME ;\nBEGIN\n  MOVE ARM_1 TO P0 ;\n  MOVE ARM_1 TO P1 ;\n  MOVE ARM_1 TO P2 ;\nEND.\n"
@@ -258,6 +326,83 @@ def test_breakpoints_steps_and_back(pages: Pages) -> None:
     np.testing.assert_array_equal(pages.studio.workbench.arms["ARM_1"].q, there)
 
 
+def test_what_is_known_of_a_run(pages: Pages) -> None:
+    """The paths of tools lead where the arm goes; variables have their values where the program stands."""
+    text = PROGRAM.replace("FRAME ;", "FRAME ; n : SCALAR ;").replace(
+        "  MOVE ARM_1 TO HIGH", "  n = 7 ;\n  MOVE ARM_1 TO HIGH"
+    )
+    pages.send("text", text=text, version=0)
+    pages.send("break", line=6, on=True)
+    pages.send("run")
+    pages.wait(6.0)
+    state = pages.state()
+    assert {"name": "n", "value": "7", "type": "SCALAR"} in state["run"]["variables"]
+    rows = np.array(state["paths"]["ARM_1"])
+    assert (np.diff(rows[:, 0]) >= 0).all()
+    np.testing.assert_allclose(rows[-1, 1:], pages.tool[:3, 3], atol=1e-4)
+    assert "paths" not in pages.state()
+
+
+def test_compared_motions(pages: Pages) -> None:
+    """Two motions are kept with their figures, which are those of the recording."""
+    for share in ("", ", WITH SPEED = 50"):
+        pages.send("text", text=PROGRAM.replace("LOW ;", f"LOW{share} ;"), version=pages.studio.project.program.version)
+        pages.send("run")
+        pages.wait(12.0)
+        assert pages.send("keep motion") == ""
+        pages.send("stop")
+    fast, slow = pages.state()["compared"]
+    assert fast["duration"] < slow["duration"]
+    for motion in (fast, slow):
+        arm, recording_end = motion["arms"]["ARM_1"], motion["duration"]
+        path = np.array(arm["path"])
+        assert arm["t"][-1] == pytest.approx(recording_end, abs=2e-3)
+        assert arm["figures"]["way"] == pytest.approx(np.linalg.norm(np.diff(path, axis=0), axis=1).sum(), rel=1e-2)
+        most = pages.file.cell.arms["ARM_1"].arm.limits.speed
+        share = np.abs(np.array(arm["qd"])).max(axis=0) / most
+        assert arm["figures"]["speed_share"] == pytest.approx(share.max(), rel=1e-2)
+        assert arm["figures"]["speed_joint"] == share.argmax() + 1
+    assert fast["arms"]["ARM_1"]["figures"]["way"] == pytest.approx(slow["arms"]["ARM_1"]["figures"]["way"], rel=1e-4)
+
+
+def test_devices(tmp_path: Path) -> None:
+    """Devices are switched by hand, and shown as a run switches them."""
+    pages = Pages(
+        tmp_path,
+        cell=CELL.replace("[frames]", "[devices.lamp]\n[devices.press]\n[frames]"),
+        program="BEGIN OPERATE lamp ON ; PAUSE 1 ; OPERATE lamp OFF ; PAUSE 1 END.\n",
+    )
+    assert pages.send("operate", device="PRESS", on=True) == ""
+    assert pages.state()["devices"] == {"LAMP": False, "PRESS": True}
+    assert "did you mean" in pages.send("operate", device="PRES", on=True).lower()
+    pages.send("run")
+    pages.wait(0.5)
+    assert pages.state()["devices"] == {"LAMP": True, "PRESS": False}
+    pages.wait(1.0)
+    assert pages.state()["devices"] == {"LAMP": False, "PRESS": False}
+
+
+def test_what_a_camera_sees() -> None:
+    """A picture shows the cell as it is shown, and changes when an arm moves into it."""
+    pytest.importorskip("cv2")
+    file = CellFile(EXAMPLES / "vision_cell.toml")
+    studio = Studio(Project(Workbench(file.cell)))
+    studio.workbench.warm_up()
+    studio.page_opened(1)
+    camera = next(iter(file.cell.cameras))
+    pictures = []
+    for value in (0.0, 0.4):
+        studio.receive(json.dumps({"do": "joint", "arm": "ARM_1", "joint": 1, "value": value}), 1, 0.0)
+        studio.receive(json.dumps({"do": "look", "camera": camera}), 1, 0.0)
+        ((_, job),) = studio.jobs
+        studio.jobs.clear()
+        pictures.append(base64.b64decode(job()["picture"]["png"]))
+    assert all(picture.startswith(b"\x89PNG") for picture in pictures)
+    assert pictures[0] != pictures[1]
+    studio.receive(json.dumps({"do": "look", "camera": "TPO"}), 1, 0.0)
+    assert "no camera" in studio.state(1)["refusal"]
+
+
 def test_run_from_here(pages: Pages) -> None:
     """From a line on the program runs from where the arm is, and one line by itself."""
     pages.send("joint", arm="ARM_1", joint=1, value=0.5)
@@ -270,6 +415,52 @@ def test_run_from_here(pages: Pages) -> None:
     np.testing.assert_allclose(pages.tool, pages.file.cell.tree().world("LOW"), atol=1e-6)
     pages.send("stop")
     assert "no statement" in pages.send("run", line=6)
+
+
+def test_completion_and_description(pages: Pages) -> None:
+    """What can be written at a position, and what stands there, in a text beyond the first plane of characters too."""
+    text = "{ \U0001f916 }\nVAR low : FRAME ;\nBEGIN\n  MOVE ARM_1 TO l\nEND.\n"
+    pages.send("complete", text=text, offset=text.index("l\nEND") + 1)
+    ((_, job),) = pages.studio.jobs
+    pages.studio.jobs.clear()
+    (first,) = [it for it in job()["completions"] if it["label"] == "low"]
+    assert text[first["start"] : first["end"]] == "l"
+    assert pages.send("text", text=text, version=0) == ""
+    problems = pages.state()["program"]["diagnostics"]
+    assert len(text[: text.index("l\nEND")].encode("utf-16-le")) // 2 in {it["start"] for it in problems}
+    pages.send("describe", offset=text.index("low"))
+    ((_, job),) = pages.studio.jobs
+    assert "FRAME" in job()["description"]
+
+
+def test_imports(pages: Pages) -> None:
+    """A program in the studio IMPORTs what lies beside it, and runs with the frames of that."""
+    (pages.file.path.parent / "more.toml").write_text(
+        "[frames]\nASIDE = [1, 0, 0,  0,-1, 0,  0, 0,-1,  0.4, -0.1, 0.2]\n"
+    )
+    text = "IMPORT 'more.toml' ;\nBEGIN MOVE ARM_1 TO ASIDE END.\n".replace("'", '"')
+    assert pages.send("text", text=text, version=0) == ""
+    assert pages.state()["program"]["diagnostics"] == []
+    pages.send("run")
+    pages.wait(6.0)
+    np.testing.assert_allclose(pages.tool[:3, 3], (0.4, -0.1, 0.2), atol=1e-6)
+    pages.send("stop")
+    pages.send("text", text=text.replace("more", "none"), version=1)
+    assert "none.toml" in pages.state()["program"]["diagnostics"][0]["text"]
+
+
+def test_ends_of_lines(tmp_path: Path) -> None:
+    """A file keeps its ends of lines; pages know one."""
+    pages = Pages(tmp_path, program="")
+    path = tmp_path / "bench.rlo"
+    path.write_bytes(PROGRAM.replace("\n", "\r\n").encode())
+    pages.studio.project.program = ProgramText(path, read_program(path), pages.file.cell)
+    text = pages.state()["source"]
+    assert text == PROGRAM
+    assert not pages.state()["program"]["changed"]
+    pages.send("text", text=text.replace("Two", "2"), version=0)
+    assert pages.send("save", what="program") == ""
+    assert path.read_bytes() == PROGRAM.replace("Two", "2").replace("\n", "\r\n").encode()
 
 
 def test_a_program_with_errors(pages: Pages) -> None:
@@ -306,9 +497,10 @@ def test_what_is_kept_of_a_run(pages: Pages) -> None:
     beginnings = {"page": b"<!DOCTYPE html>", "gltf": b"glTF", "gif": b"GIF8"}
     for what in beginnings:
         assert pages.send("keep", what=what, arm="ARM_1") == ""
-    for page, job in pages.studio.jobs:
-        made = job()
+    names = set()
+    for (page, job), beginning in zip(pages.studio.jobs, beginnings.values(), strict=True):
+        made = job()["download"]
         assert page == 1
-        assert any(made.content.startswith(beginning) for beginning in beginnings.values())
-        assert made.message()["download"]["name"] == made.name
-    assert len({job().name for _, job in pages.studio.jobs}) == 3
+        assert base64.b64decode(made["data"]).startswith(beginning)
+        names.add(made["name"])
+    assert len(names) == 3

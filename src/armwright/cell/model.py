@@ -27,6 +27,10 @@ def _as_configuration(value: ArrayLike) -> Array:
     return read_only(floats(value, "start"))
 
 
+def _as_joint_target(value: ArrayLike) -> Array:
+    return read_only(floats(value, "q"))
+
+
 def _as_gravity(value: ArrayLike) -> Array:
     return exact_shape(value, (3,), "gravity", LARGEST)
 
@@ -75,6 +79,19 @@ class CellArm:
             raise ShapeError(f"start: expected {self.arm.n} numbers, one per joint, got shape {self.start.shape}")
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class JointTarget:
+    """A configuration of an arm that has a name.
+
+    Attributes:
+        arm: name of the arm.
+        q: (n,) its joint positions.
+    """
+
+    arm: str
+    q: Array = attrs.field(converter=_as_joint_target)
+
+
 @attrs.frozen(kw_only=True)
 class ContactPlane:
     """A horizontal elastic plane with which arms and parts come into contact.
@@ -99,6 +116,7 @@ class Cell:
         arms: by name, such as ``ARM_1``; the gravity of each model is that of the cell, along the axes of its base.
         gravity: (3,) acceleration of free fall along the axes of the world [m/s²].
         frames: by name, in upper case.
+        joint_targets: configurations of arms by name, in upper case; no frame has such a name.
         spreads: how far from where programs believe it a frame, and what stands on it, may be in a world, by name.
         fixtures: bodies that stand where they are, by name.
         parts: bodies that grippers hold and move, by name.
@@ -127,6 +145,7 @@ class Cell:
     arms: Mapping[str, CellArm]
     gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_as_gravity)
     frames: Mapping[str, Node] = attrs.field(factory=dict)
+    joint_targets: Mapping[str, JointTarget] = attrs.field(factory=dict)
     spreads: Mapping[str, Spread] = attrs.field(factory=dict)
     fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)
     parts: Mapping[str, Part] = attrs.field(factory=dict)

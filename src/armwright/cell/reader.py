@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 
 import attrs
@@ -15,9 +15,9 @@ from armwright.arrays import Array
 from armwright.cell.assembly import is_assembly
 from armwright.cell.camera_reader import read_cameras, read_visions, refuse_hidden_markers
 from armwright.cell.control_reader import read_alarms, read_force_sensor, read_plant, read_sensors, read_servo
-from armwright.cell.entries import ARM_NAME, read_name, read_pose, read_spread, refuse_too_many
+from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, read_spread, refuse_too_many
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.model import Around, Cell, CellArm, ContactPlane
+from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarget
 from armwright.cell.names import arm_name
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
@@ -101,6 +101,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         arms=arms,
         gravity=_read_gravity(top),
         frames=frames,
+        joint_targets=_read_joint_targets(top.table("joint_targets"), arms, frames),
         spreads=spreads,
         fixtures=fixtures,
         parts=parts,
@@ -237,17 +238,22 @@ def _with_tool(arm: Arm, table: Table) -> Arm:
     return attrs.evolve(arm, tool=read_pose(table, "tool", default=arm.tool))
 
 
+def _read_positions(table: Table, arm: Arm) -> Array:
+    """Read joint positions of an arm that its limits allow."""
+    q = table.vector("joint_positions", arm.n)
+    if mistake := degrees_by_mistake(arm, q):
+        raise table.error("joint_positions", mistake)
+    for fault in violations(arm, q):
+        raise table.error("joint_positions", str(fault))
+    return q
+
+
 def _read_start(table: Table, arm: Arm, base: Array) -> Array:
     """Read the initial configuration of an arm: its joint positions, or the pose of its gripper in the world."""
     if "joint_positions" in table:
         if "hand" in table:
             raise table.error("hand", "the start is specified twice, as hand and as joint_positions")
-        q = table.vector("joint_positions", arm.n)
-        if mistake := degrees_by_mistake(arm, q):
-            raise table.error("joint_positions", mistake)
-        for fault in violations(arm, q):
-            raise table.error("joint_positions", str(fault))
-        return q
+        return _read_positions(table, arm)
     if "hand" not in table:
         raise table.error("hand", "missing; specify the initial pose of the gripper, or the joints as joint_positions")
     solution = inverse(arm, inverse_pose(base) @ read_pose(table, "hand"))
@@ -290,6 +296,21 @@ def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], di
         if name in spreads and (arm := frames[path[-1]].parent) in arms:
             raise entry.error(None, f"{name} moves with {arm}; only a frame that stands can have a spread")
     return frames, spreads
+
+
+def _read_joint_targets(table: Table, arms: Mapping[str, CellArm], frames: Collection[str]) -> dict[str, JointTarget]:
+    """Read the named configurations of arms."""
+    refuse_too_many(table, "frames")
+    targets: dict[str, JointTarget] = {}
+    for key in table:
+        name = read_name(table, key, targets)
+        if name in frames or name == "STATION":
+            raise table.error(key, f"{name} is a frame of the cell already")
+        entry = table.table(key)
+        arm = known_name(entry, "arm", entry.text("arm", default=next(iter(arms), "ARM_1")), arms, "an arm")
+        targets[name] = JointTarget(arm=arm, q=_read_positions(entry, arms[arm].arm))
+        entry.refuse_unknown_keys()
+    return targets
 
 
 def _standing(frames: Mapping[str, Node], arms: Iterable[str]) -> FrameTree:

@@ -34,8 +34,9 @@ def fix(
 
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
-    from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all, write_back
+    from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all
     from armwright.cli.terminal import print_verbatim
+    from armwright.files.output import write_back
     from armwright.program import compile as compile_program
     from armwright.program.api import import_reader
     from armwright.program.diagnostics.fixes import apply_fixes
@@ -50,7 +51,7 @@ def fix(
         read = import_reader(path.parent)
         result = apply_fixes(source, partial(compile_program, cell=option_cell, std=std, read_import=read))
         if result.applied and not (diff or printed):
-            write_back(source, path, result.text)
+            write_back(path, source.text, result.text, "program_mb")
         cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.description} for cure in result.applied]
         row |= {**diagnostics_data(result.compilation), "cures": cures, **({"text": result.text} if printed else {})}
         if as_json:

@@ -33,8 +33,9 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
-    from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all, write_back
+    from armwright.cli.source_files import is_stream, print_difference, read_source, rewrite_all
     from armwright.cli.terminal import print_verbatim
+    from armwright.files.output import write_back
     from armwright.program.formatter.format import formatted
 
     def rewrite(path: Path, row: dict[str, Any]) -> None:
@@ -42,7 +43,7 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
         after = formatted(source, std=std, numbers=numbers)
         changed = row["changed"] = after != source.text
         if changed and not (check or diff or stdout or streamed):
-            write_back(source, path, after)
+            write_back(path, source.text, after, "program_mb")
         if check and changed:
             row["exit_status"] = ExitStatus.CHECK_FAILED
         if as_json:

@@ -2,7 +2,6 @@
 
 import difflib
 import sys
-from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,9 @@ import typer
 from armwright.cli.failures import outcome
 from armwright.cli.output import print_json
 from armwright.cli.terminal import console
-from armwright.errors import ArmwrightError, ExitStatus, OutputError
-from armwright.files.inputs import decode, read_bytes, read_program, read_typed_program
-from armwright.files.output import descriptor, write_file
+from armwright.errors import ArmwrightError, ExitStatus
+from armwright.files.inputs import read_program, read_typed_program
+from armwright.files.output import descriptor
 from armwright.program.language.source import Source
 
 # The path that denotes the standard input.
@@ -74,25 +73,3 @@ def print_difference(source: Source, after: str) -> None:
             terminal.print(line, style=styles.get(line[0]), soft_wrap=True)
         else:
             print(line)
-
-
-def write_back(source: Source, path: Path, text: str) -> None:
-    """Replace the text of a program in its file, completely or not at all; links and permissions are preserved.
-
-    The most frequent line ending of the file is used, and a byte order mark is preserved.
-
-    Args:
-        source: the program as it was read.
-        path: its file.
-        text: its new text.
-
-    Raises:
-        FileFormatError: the file cannot be read any more.
-        OutputError: the file cannot be written, or has changed since; the message has the reason.
-    """
-    data = read_bytes(path, "program_mb")
-    if decode(data, path) != source.text:
-        raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")
-    mark = "\ufeff" if data.startswith(BOM_UTF8) else ""
-    end = "\r\n" if 2 * data.count(b"\r\n") > data.count(b"\n") else "\n"
-    write_file(path, mark + text.replace("\n", end), back=True)

@@ -14,13 +14,14 @@ import os
 import re
 import stat
 import sys
+from codecs import BOM_UTF8
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
 from armwright.files.exchange import exchange_files, overwrite
-from armwright.files.inputs import is_source
+from armwright.files.inputs import decode, is_source, read_bytes
 from armwright.files.result_folder import BACKUP, PREFIX, deferred_signals, staging_folder
 
 Content: TypeAlias = str | bytes | Iterable[str]
@@ -109,6 +110,29 @@ def write_file(path: Path, text: Content, *, back: bool = False) -> None:
                 WRITTEN[named] = None
         else:
             _write_beside(path, named, text, there)
+
+
+def write_back(path: Path, before: str, text: str, bound: str = "table_mb") -> None:
+    """Replace the text of a file that was read, completely or not at all; links and permissions are preserved.
+
+    The most frequent line ending of the file is used, and a byte order mark is preserved.
+
+    Args:
+        path: the file; where it is missing, it is made.
+        before: its text as it was read.
+        text: its new text.
+        bound: the name of the limit of its size, in MB.
+
+    Raises:
+        FileFormatError: the file cannot be read any more.
+        OutputError: the file cannot be written, or has changed since; the message has the reason.
+    """
+    data = read_bytes(path, bound) if path.exists() else b""
+    if decode(data, path) != before:
+        raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")
+    mark = "\ufeff" if data.startswith(BOM_UTF8) else ""
+    end = "\r\n" if 2 * data.count(b"\r\n") > data.count(b"\n") else "\n"
+    write_file(path, mark + text.replace("\n", end), back=True)
 
 
 def descriptor(path: Path) -> int | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,11 @@ class Log:
         values = full[block][row] if block < len(full) else self._rows[arm][row]
         n = (len(values) - 1) // 5
         return Measured(values[:n], values[n : 2 * n], values[2 * n : 3 * n], values[4 * n : 5 * n])
+
+    def part_pose(self, part: str, time: float) -> Array:
+        """Return the pose (4, 4) of a part in the world at a time [s] that has been recorded."""
+        track = self._tracks[part]
+        return track[max(0, bisect_right(track, time, key=lambda row: row[0]) - 1)][1]
 
     def streams(self) -> tuple[MeasuredStream, ...]:
         """Return what was recorded, one stream per arm."""

@@ -319,6 +319,15 @@ class PhysicsCell:
             return Measured(q, rest, rest, q)
         return self._log.at(arm, round(time / self._cell.period))
 
+    def part_pose(self, part: str, time: float) -> Array:
+        """Return the pose (4, 4) of a part in the world at a time [s] that has gone by."""
+        return self._log.part_pose(part, time)
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """The latest pictures that cameras have taken."""
+        return self._pictures
+
     def true_pose(self, part: str) -> Array:
         """Return the pose (4, 4) of a part in the world, as it is now."""
         return part_pose(self._data, part)

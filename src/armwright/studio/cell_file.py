@@ -1,4 +1,4 @@
-"""The cell file of a studio: frames taught into it, its comments kept, the change shown before it is written."""
+"""The cell file of a studio: frames and joint targets taught into it, its comments kept, the change shown first."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from armwright.cell.reader import parse_cell, read_cell
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_text
-from armwright.files.output import write_file
+from armwright.files.output import write_back
 from armwright.spatial.poses import inverse, to_noap
 
-# Decimals of rotations, and of positions [m].
+# Decimals of rotations and of positions [m] of frames, and of joint positions [rad], [m].
 _DECIMALS = np.repeat((9, 7), (9, 3))
+_JOINT_DECIMALS = 7
 # Changes that can be taken back at most.
 _MOST_UNDONE = 200
-_FRAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 
 
 class TeachingError(ArmwrightError, ValueError):
@@ -69,42 +70,62 @@ class CellFile:
         """
         self._check_name(name)
         document = self._parsed()
-        frames = self._frames(document)
+        frames = self._table(document, "frames")
         key = self._key(frames, name) or name.upper()
         pose = _toml_pose(to_noap(X_WF if X_WP is None else inverse(X_WP) @ X_WF))
         frames[key] = _value(pose if on == WORLD else f'{{ on = "{on}", at = {pose} }}')
         self._take(document)
 
+    def teach_joints(self, name: str, arm: str, q: Array) -> None:
+        """Add a joint target, or give it other joint positions.
+
+        Args:
+            name: of the target.
+            arm: name of the arm.
+            q: (n,) its joint positions.
+
+        Raises:
+            TeachingError: the name is none, or the cell would be wrong.
+        """
+        self._check_name(name)
+        document = self._parsed()
+        targets = self._table(document, "joint_targets")
+        key = self._key(targets, name) or name.upper()
+        limits = self.cell.arms[arm].arm.limits
+        rounded = np.clip(np.round(q, _JOINT_DECIMALS), limits.lower, limits.upper)
+        numbers = ", ".join(repr(float(value) + 0.0) for value in rounded)
+        targets[key] = _value(f'{{ arm = "{arm}", joint_positions = [{numbers}] }}')
+        self._take(document)
+
     def rename(self, name: str, new: str) -> None:
-        """Give a frame another name; frames that hang on it follow.
+        """Give a frame or a joint target another name; frames that hang on it follow.
 
         Raises:
             TeachingError: the name is none or taken, or the cell would be wrong.
         """
         self._check_name(new)
         document = self._parsed()
-        frames = self._frames(document)
-        key = self._known(frames, name)
-        if new.upper() != key.upper() and self._key(frames, new) is not None:
-            raise TeachingError(f"there is a frame {new.upper()} already")
-        items = [(new.upper() if old == key else old, frames[old]) for old in list(frames)]
-        for old in list(frames):
-            del frames[old]
+        table, key = self._entry(document, name)
+        if new.upper() != key.upper() and any(self._key(each, new) is not None for each in self._tables(document)):
+            raise TeachingError(f"{new.upper()} is taken already")
+        items = [(new.upper() if old == key else old, table[old]) for old in list(table)]
+        for old in list(table):
+            del table[old]
         for old, value in items:
             if hasattr(value, "get") and str(value.get("on", "")).upper() == key.upper():
                 value["on"] = new.upper()
-            frames[old] = value
+            table[old] = value
         self._take(document)
 
     def forget(self, name: str) -> None:
-        """Take a frame out.
+        """Take a frame or a joint target out.
 
         Raises:
             TeachingError: there is none, or another one hangs on it.
         """
         document = self._parsed()
-        frames = self._frames(document)
-        del frames[self._known(frames, name)]
+        table, key = self._entry(document, name)
+        del table[key]
         self._take(document)
 
     def undo(self) -> None:
@@ -127,12 +148,9 @@ class CellFile:
         """Write the text to the file.
 
         Raises:
-            TeachingError: somebody else has changed the file meanwhile.
-            OutputError: it cannot be written.
+            OutputError: it cannot be written, or somebody else has changed it meanwhile.
         """
-        if self.path.exists() and read_text(self.path) != self._saved:
-            raise TeachingError(f"{self.path.name} has been changed by another program; nothing is written over it")
-        write_file(self.path, self.text, back=True)
+        write_back(self.path, self._saved, self.text)
         self._saved = self.text
 
     # ---- the document --------------------------------------------------------------------------------------------
@@ -142,26 +160,33 @@ class CellFile:
             raise TeachingError(f"frames are taught into TOML files, and {self.path.name} is JSON")
         return import_extra("tomlkit", "teaching", "studio").parse(self.text)
 
-    def _frames(self, document: Any) -> Any:
-        tomlkit = import_extra("tomlkit", "teaching", "studio")
-        if "frames" not in document:
-            document["frames"] = tomlkit.table()
-        return document["frames"]
+    @staticmethod
+    def _table(document: Any, name: str) -> Any:
+        if name not in document:
+            document[name] = import_extra("tomlkit", "teaching", "studio").table()
+        return document[name]
 
     @staticmethod
-    def _key(frames: Any, name: str) -> str | None:
-        return next((key for key in frames if key.upper() == name.upper()), None)
+    def _tables(document: Any) -> list[Any]:
+        """Return the tables with what has been taught."""
+        return [document[name] for name in ("frames", "joint_targets") if name in document]
 
-    def _known(self, frames: Any, name: str) -> str:
-        key = self._key(frames, name)
-        if key is None:
-            raise UnknownNameError("frame", name, list(frames))
-        return key
+    @staticmethod
+    def _key(table: Any, name: str) -> str | None:
+        return next((key for key in table if key.upper() == name.upper()), None)
+
+    def _entry(self, document: Any, name: str) -> tuple[Any, str]:
+        """Return the table in which something has been taught, and its key there."""
+        tables = self._tables(document)
+        for table in tables:
+            if (key := self._key(table, name)) is not None:
+                return table, key
+        raise UnknownNameError("frame or joint target", name, [key for table in tables for key in table])
 
     @staticmethod
     def _check_name(name: str) -> None:
-        if not _FRAME.match(name):
-            raise TeachingError(f"a frame has a name of letters, digits and _ that begins with a letter, got {name!r}")
+        if not _NAME.match(name):
+            raise TeachingError(f"a name has letters, digits and _, and begins with a letter, got {name!r}")
 
     def _take(self, document: Any) -> None:
         """Take a changed document, if it is a cell."""

@@ -137,8 +137,16 @@ class Teach:
 
 
 @attrs.frozen(kw_only=True)
+class TeachJoints:
+    """Add a joint target to the cell file with the configuration of an arm, or give it that configuration."""
+
+    arm: str
+    name: str
+
+
+@attrs.frozen(kw_only=True)
 class Rename:
-    """Give a frame of the cell file another name."""
+    """Give a frame or a joint target of the cell file another name."""
 
     name: str
     to: str
@@ -146,7 +154,7 @@ class Rename:
 
 @attrs.frozen(kw_only=True)
 class Forget:
-    """Take a frame out of the cell file."""
+    """Take a frame or a joint target out of the cell file."""
 
     name: str
 
@@ -165,10 +173,10 @@ class Save:
 
 @attrs.frozen(kw_only=True)
 class GoTo:
-    """Bring the tool of an arm to a frame."""
+    """Bring the tool of an arm to a frame, or the arm to a joint target."""
 
     arm: str
-    frame: str
+    name: str
 
 
 @attrs.frozen(kw_only=True)
@@ -193,6 +201,8 @@ class InsertMove:
         frame: name of the frame.
         line: behind which the MOVE is inserted, from 0.
         straight: whether along a straight line.
+        approach: length of the straight line along the z axis of the goal that ends there [m]; 0 for none.
+        departure: length of the straight line against the z axis of the tool by which it begins [m]; 0 for none.
         speed: 100 being normal.
     """
 
@@ -200,7 +210,26 @@ class InsertMove:
     frame: str
     line: int
     straight: bool = False
+    approach: float = 0.0
+    departure: float = 0.0
     speed: float = 100.0
+
+
+@attrs.frozen(kw_only=True)
+class InsertVia:
+    """Teach a frame where the tool is, and let the MOVE in a line go past it.
+
+    Attributes:
+        arm: name of the arm.
+        frame: name of the frame.
+        line: from 1.
+        blend: how far before the frame the corner may begin [m]; 0 for as far as the cell allows.
+    """
+
+    arm: str
+    frame: str
+    line: int
+    blend: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -274,10 +303,10 @@ class Map:
 
 @attrs.frozen(kw_only=True)
 class Preview:
-    """Show where an arm would be with its tool at a frame; without a name, show that no more."""
+    """Show where an arm would be at a frame or a joint target; without a name, show that no more."""
 
     arm: str
-    frame: str
+    name: str
 
 
 @attrs.frozen(kw_only=True)
@@ -286,6 +315,46 @@ class Keep:
 
     what: Literal["page", "gltf", "gif"]
     arm: str
+
+
+@attrs.frozen(kw_only=True)
+class Operate:
+    """Switch a device of the cell."""
+
+    device: str
+    on: bool
+
+
+@attrs.frozen(kw_only=True)
+class Look:
+    """Send what a camera sees."""
+
+    camera: str
+
+
+@attrs.frozen(kw_only=True)
+class KeepMotion:
+    """Keep the motion of the run, to be compared with another one."""
+
+
+@attrs.frozen(kw_only=True)
+class Complete:
+    """Send what can be written at a position.
+
+    Attributes:
+        text: the program as it is being written.
+        offset: of the position, in characters.
+    """
+
+    text: str
+    offset: int
+
+
+@attrs.frozen(kw_only=True)
+class Describe:
+    """Send what there is to say about what stands at a position of the program, in characters."""
+
+    offset: int
 
 
 Command: TypeAlias = (
@@ -301,6 +370,7 @@ Command: TypeAlias = (
     | AskForControl
     | AnswerRequest
     | Teach
+    | TeachJoints
     | Rename
     | Forget
     | Unteach
@@ -308,6 +378,7 @@ Command: TypeAlias = (
     | GoTo
     | SetText
     | InsertMove
+    | InsertVia
     | TouchUp
     | Break
     | Run
@@ -319,6 +390,11 @@ Command: TypeAlias = (
     | Map
     | Preview
     | Keep
+    | Operate
+    | Look
+    | KeepMotion
+    | Complete
+    | Describe
 )
 # By the word in a message.
 _COMMANDS: dict[str, type[Any]] = {
@@ -334,6 +410,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "ask": AskForControl,
     "answer": AnswerRequest,
     "teach": Teach,
+    "teach joints": TeachJoints,
     "rename": Rename,
     "forget": Forget,
     "unteach": Unteach,
@@ -341,6 +418,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "go to": GoTo,
     "text": SetText,
     "insert": InsertMove,
+    "via": InsertVia,
     "touch up": TouchUp,
     "break": Break,
     "run": Run,
@@ -352,6 +430,11 @@ _COMMANDS: dict[str, type[Any]] = {
     "map": Map,
     "preview": Preview,
     "keep": Keep,
+    "operate": Operate,
+    "look": Look,
+    "keep motion": KeepMotion,
+    "complete": Complete,
+    "describe": Describe,
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
+from concurrent.futures import Executor, Future
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -12,7 +13,8 @@ from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.cell.part_poses import PartTrack
+from armwright.cell.observations import Picture
+from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.servo import Measured
 from armwright.physics.world import PhysicsCell
 from armwright.program.bytecode.instructions import Code
@@ -24,6 +26,10 @@ from armwright.program.vm.recording import Effect, Recording
 _SLICE, _AHEAD = 0.008, 1.0
 # Lines of the trace that a page gets.
 _TRACE = 300
+# Variables that it gets.
+_MOST_VARIABLES = 100
+# Of a path as many of the latest stretches are shown, each by so many points a second [1/s], and at most so many.
+_PATH_SEGMENTS, _PATH_RATE, _PATH_POINTS = 40, 25.0, 200
 
 Way: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back"]
 
@@ -38,7 +44,14 @@ class ProgramRun:
         rate: how fast, 1 being real time.
     """
 
-    def __init__(self, code: Code, cell: Cell, hardware: HardwareFactory, lines: Iterable[int]) -> None:
+    def __init__(
+        self,
+        code: Code,
+        cell: Cell,
+        hardware: HardwareFactory,
+        lines: Iterable[int],
+        executor: Executor | None = None,
+    ) -> None:
         """Load a program.
 
         Args:
@@ -46,8 +59,13 @@ class ProgramRun:
             cell: it runs in.
             hardware: how the cell is set up.
             lines: of the breakpoints.
+            executor: computes the run beside whoever shows it, whom planning a MOVE would hold up; None for none.
         """
         self.debugger = Debugger(code, cell, hardware=hardware)
+        self._executor = executor
+        self._computing: Future[Stop | None] | None = None
+        self._paths: dict[str, tuple[int, list[list[float]]]] = {}
+        self._variables: tuple[Stop | None, list[dict[str, str]]] = (None, [])
         self.time, self.playing, self.rate = 0.0, False, 1.0
         self.set_breakpoints(lines)
         self._cell = cell
@@ -55,6 +73,7 @@ class ProgramRun:
 
     def set_breakpoints(self, lines: Iterable[int]) -> None:
         """Stop at these lines, and at no others."""
+        self._wait()
         for one in list(self.debugger.execution.breakpoints):
             self.debugger.remove_breakpoint(one.number)
         for line in lines:
@@ -72,6 +91,7 @@ class ProgramRun:
             DebuggerError: the program is over.
         """
         debugger = self.debugger
+        self._wait()
         if debugger.running or self.time < self.end - 1e-9:
             if way == "continue":
                 self.playing = True
@@ -93,7 +113,7 @@ class ProgramRun:
         """Let time go by [s]; return whether anything has changed."""
         debugger = self.debugger
         if debugger.running and (self._backwards or self.end < self.time + _AHEAD):
-            debugger.run_slice(_SLICE)
+            self._compute()
         if self._backwards:
             if not debugger.running:
                 self._backwards, self.time, self.playing = False, self.end, False
@@ -106,6 +126,20 @@ class ProgramRun:
             self.playing = False
             return True
         return self.time != before
+
+    def _compute(self) -> None:
+        """Let the program itself go on for a while."""
+        if self._executor is None:
+            self.debugger.run_slice(_SLICE)
+        elif self._computing is None or self._computing.done():
+            self._wait()
+            self._computing = self._executor.submit(self.debugger.run_slice, _SLICE)
+
+    def _wait(self) -> None:
+        """Wait until nothing computes beside, and raise what was raised there."""
+        if self._computing is not None:
+            computing, self._computing = self._computing, None
+            computing.result()
 
     @property
     def end(self) -> float:
@@ -149,11 +183,56 @@ class ProgramRun:
 
     def parts(self) -> dict[str, tuple[str | None, Array]]:
         """Return for each part the arm that holds it, and its pose on that hand or in the world."""
-        tracks: dict[str, PartTrack] = {
-            **self.debugger.machine.hardware.part_poses().tracks,
-            **self.debugger.machine.hardware.observations().parts,
-        }
-        return {name: track.at(self.time + 1e-9) for name, track in tracks.items()}
+        hardware, time = self.debugger.machine.hardware, self.time + 1e-9
+        if isinstance(hardware, PhysicsCell):
+            return {name: (None, hardware.part_pose(name, time)) for name in self._cell.parts}
+        return {name: track.at(time) for name, track in hardware.part_poses().tracks.items()}
+
+    def pictures(self) -> tuple[Picture, ...]:
+        """Return the pictures that cameras have taken up to the time that is shown."""
+        hardware = self.debugger.machine.hardware
+        taken = hardware.pictures if isinstance(hardware, PhysicsCell) else ()
+        return tuple(picture for picture in taken if picture.time <= self.time + 1e-9)
+
+    def devices(self) -> dict[str, bool]:
+        """Return which devices have been switched, and whether they are on, at the time that is shown."""
+        switched: dict[str, bool] = {}
+        for effect in self.debugger.machine.state.effects:
+            if effect.kind == "OPERATE" and effect.t0 <= self.time + 1e-9:
+                device, _, state = effect.text.rpartition(" ")
+                switched[device.upper()] = state == "ON"
+        return switched
+
+    def path(self, arm: str) -> list[list[float]]:
+        """Return where the tool of an arm goes on the path that is known: rows of time [s], x, y and z [m]."""
+        segments = self.debugger.machine.state.segments[arm]
+        count = len(segments)
+        if self._paths.get(arm, (0, []))[0] != count:
+            rows: list[list[float]] = []
+            placed = self._cell.arms[arm]
+            for segment in segments[max(0, count - _PATH_SEGMENTS) : count]:
+                t = np.linspace(0.0, segment.duration, 2 + int(min(segment.duration * _PATH_RATE, _PATH_POINTS)))
+                X = placed.base @ forward(placed.arm, np.asarray(segment.trajectory(t)))
+                rows += np.column_stack([segment.t0 + t, X[:, :3, 3]]).round(4).tolist()
+            self._paths[arm] = count, rows
+        return self._paths.get(arm, (0, []))[1]
+
+    @property
+    def path_number(self) -> int:
+        """Counts the stretches of all paths."""
+        return sum(map(len, self.debugger.machine.state.segments.values()))
+
+    def variables(self) -> list[dict[str, str]]:
+        """Return the variables where the program stands, as plain data; none while it runs."""
+        stop = self.stop
+        if stop is None or stop.has_ended:
+            return []
+        if self._variables[0] is not stop:
+            groups = [it for it in self.debugger.scopes(stop.path) if it.name in {"Locals", "Variables"}]
+            found = [it for group in groups if group.children for it in group.children()]
+            rows = [{"name": it.name, "value": it.value, "type": it.type} for it in found[:_MOST_VARIABLES]]
+            self._variables = stop, rows
+        return self._variables[1]
 
     def opening(self, arm: str) -> float:
         """Return how far the fingers of an arm are open, 0 to 1, at the time that is shown."""
@@ -201,7 +280,7 @@ class ProgramRun:
             "reason": "" if stop is None else stop.reason,
             "text": "" if stop is None or stop.diagnostic is None else stop.diagnostic.message,
             "motions": {name: self._motion_state(name) for name in self._cell.arms},
-            "devices": sorted(self.debugger.machine.hardware.active_devices()),
+            "variables": self.variables(),
             "trace": [
                 {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
                 for effect in trace[-_TRACE:]
@@ -218,6 +297,7 @@ class ProgramRun:
 
     def recording(self) -> Recording:
         """Return all that the program has done so far."""
+        self._wait()
         stop = self.debugger.stop
         if stop is not None and stop.recording is not None:
             return stop.recording()

@@ -3,27 +3,73 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
-from armwright.files.inputs import read_program
-from armwright.files.output import write_file
-from armwright.program.api import Compilation, compile as compile_program
+from armwright.extras import import_extra
+from armwright.files.output import write_back
+from armwright.program.api import Compilation, compile as compile_program, import_reader
 from armwright.program.flow_analysis.side_effects import walk_statements
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCodec, column_count
 from armwright.program.language.source import Source
 from armwright.program.syntax.nodes import ArmName, Name
-from armwright.program.syntax.tree import Move
+from armwright.program.syntax.tree import Blend, Directly, Move, Straightly, Via, clause_word
 
 _NORMAL_SPEED = 100.0
+# Speeds of a MOVE, and the longest approach [m].
+_SPEEDS = (1, 120)
+_LONGEST_LINE = 1.0
 # Characters of a program at most.
 _LONGEST = 500_000
 # Diagnostics that a page gets.
 _MOST_DIAGNOSTICS = 200
+# Completions that it gets.
+_MOST_COMPLETIONS = 60
 
 
 class ProgramTextError(ArmwrightError, ValueError):
     """A text cannot be the program, or cannot be changed so."""
+
+
+class MoveForm(NamedTuple):
+    """How a MOVE goes to its goal.
+
+    Attributes:
+        straight: whether along a straight line.
+        approach: length of the straight line along the z axis of the goal that ends there [m]; 0 for none.
+        departure: length of the straight line against the z axis of the tool by which it begins [m]; 0 for none.
+        speed: 100 being normal.
+    """
+
+    straight: bool = False
+    approach: float = 0.0
+    departure: float = 0.0
+    speed: float = _NORMAL_SPEED
+
+    def clauses(self, arm: str, frame: str) -> list[str]:
+        """Return the clauses of a MOVE of an arm to a frame.
+
+        Raises:
+            ProgramTextError: they cannot be combined, or a number is out of range.
+        """
+        least, most = _SPEEDS
+        if not least <= self.speed <= most:
+            raise ProgramTextError(f"speed: expected {least} to {most}, got {self.speed:g}")
+        lines = {"DEPARTURE": (arm, self.departure), "APPROACH": (frame, self.approach)}
+        for word, (_, length) in lines.items():
+            if not 0 <= length <= _LONGEST_LINE:
+                raise ProgramTextError(
+                    f"{word.lower()}: expected 0 to {_LONGEST_LINE * 1e3:g} mm, got {length * 1e3:g}"
+                )
+        if self.straight and (self.approach or self.departure):
+            raise ProgramTextError("a MOVE that goes STRAIGHTLY has no approach and no departure")
+        return [
+            *(["STRAIGHTLY"] if self.straight else []),
+            *(f"WITH {word} = {at} * XYZ(0, 0, {-x * 1e3:g}mm)" for word, (at, x) in lines.items() if x),
+            *([f"WITH SPEED = {self.speed:g}"] if self.speed != _NORMAL_SPEED else []),
+        ]
 
 
 class ProgramText:
@@ -36,12 +82,14 @@ class ProgramText:
         compiled: what became of it.
     """
 
+    compiled: Compilation
+
     def __init__(self, path: Path | None, text: str, cell: Cell) -> None:
         """Take a text."""
         self.path, self._cell = path, cell
         self._saved = text if path is not None else ""
         self.text, self.version = text, 0
-        self.compiled = self._compile()
+        self._compile()
 
     @property
     def name(self) -> str:
@@ -56,7 +104,7 @@ class ProgramText:
     def set_cell(self, cell: Cell) -> None:
         """Take another cell, in which frames may have other names."""
         self._cell = cell
-        self.compiled = self._compile()
+        self._compile()
 
     def replace(self, text: str) -> None:
         """Take another text.
@@ -67,23 +115,64 @@ class ProgramText:
         if len(text) > _LONGEST:
             raise ProgramTextError(f"a program has at most {_LONGEST:,} characters, got {len(text):,}")
         self.text, self.version = text, self.version + 1
-        self.compiled = self._compile()
+        self._compile()
 
-    def _compile(self) -> Compilation:
-        return compile_program(Source(self.name, self.text), self._cell)
+    def _compile(self) -> None:
+        self.compiled = self._compiled(self.text)
+        self._diagnostics = [self._diagnostic_state(it) for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]]
+
+    def _compiled(self, text: str) -> Compilation:
+        read_import = None if self.path is None else import_reader(self.path.parent)
+        return compile_program(Source(self.name, text), self._cell, read_import=read_import)
+
+    def completions(self, text: str, offset: int) -> list[dict[str, Any]]:
+        """Return what can be written at a position, the likeliest first, as plain data.
+
+        Args:
+            text: the program as it is being written.
+            offset: of the position.
+
+        Raises:
+            MissingExtraError: the language server is not installed.
+        """
+        server = import_extra("armwright.program.language_server.completions", "completion", "studio", "lsprotocol")
+        codec = PositionCodec(text, UTF_32)
+        items = server.completions(codec, self._analysis(codec), offset, snippets=False)[:_MOST_COMPLETIONS]
+        return [
+            {
+                "label": it.label,
+                "detail": it.detail or "",
+                "text": it.text_edit.new_text,
+                "start": codec.offset(it.text_edit.range.start.line, it.text_edit.range.start.character),
+                "end": codec.offset(it.text_edit.range.end.line, it.text_edit.range.end.character),
+            }
+            for it in items
+        ]
+
+    def description(self, offset: int) -> str:
+        """Return what there is to say about what stands at a position; nothing where there is nothing.
+
+        Raises:
+            MissingExtraError: the language server is not installed.
+        """
+        server = import_extra("armwright.program.language_server.hover", "descriptions", "studio", "lsprotocol")
+        found = server.hover(self._analysis(PositionCodec(self.text, UTF_32)), offset, markdown=False)
+        return "" if found is None else str(found.contents.value)
+
+    def _analysis(self, codec: PositionCodec) -> Any:
+        server = import_extra("armwright.program.language_server.analysis", "completion", "studio", "lsprotocol")
+        return server.Analysis(compiled=self.compiled, codec=codec, cell=self.compiled.cell or self._cell)
 
     def save(self) -> None:
         """Write it to its file.
 
         Raises:
-            ProgramTextError: it has no file, or somebody else has changed the file meanwhile.
-            OutputError: the file cannot be written.
+            ProgramTextError: it has no file.
+            OutputError: the file cannot be written, or somebody else has changed it meanwhile.
         """
         if self.path is None:
             raise ProgramTextError("the program has no file; name one on the command line")
-        if self.path.exists() and read_program(self.path) != self._saved:
-            raise ProgramTextError(f"{self.path.name} has been changed by another program; nothing is written over it")
-        write_file(self.path, self.text, back=True)
+        write_back(self.path, self._saved, self.text, "program_mb")
         self._saved = self.text
 
     # ---- teaching ------------------------------------------------------------------------------------------------
@@ -99,42 +188,82 @@ class ProgramText:
         if any(it.code.startswith("E1") for it in self.compiled.diagnostics):
             raise ProgramTextError("the program has errors of syntax; correct them before a MOVE is inserted")
 
-    def insert_move(self, line: int, arm: str, frame: str, *, straight: bool, speed: float) -> None:
+    def insert_move(self, line: int, arm: str, frame: str, form: MoveForm) -> None:
         """Insert a MOVE behind a line.
 
         Args:
             line: from 1; 0, and every line that no statement can follow, for behind the last statement.
             arm: name of the arm.
             frame: its goal.
-            straight: whether along a straight line.
-            speed: 100 being normal.
+            form: of the MOVE.
 
         Raises:
             ProgramTextError: the program has errors of syntax, so that its statements are not known.
         """
         self.require_statements()
-        clauses = [
-            *(["STRAIGHTLY"] if straight else []),
-            *([f"WITH SPEED = {speed:g}"] if speed != _NORMAL_SPEED else []),
-        ]
+        clauses = form.clauses(arm, frame)
         offset, indent = self._place_behind(line)
-        declaration, place = self._declaration(frame)
-        statement = f"{indent}MOVE {' '.join([arm, 'TO', frame, ', '.join(clauses)]).rstrip()} ;\n"
-        text = self.text[:offset] + statement + self.text[offset:]
-        # What is declared stands in front of all statements.
-        self.replace(text[:place] + declaration + text[place:])
+        statement = f"{indent}MOVE {arm} TO {frame}{' ' if clauses else ''}{', '.join(clauses)} ;\n"
+        self._insert((offset, statement), self._declaration(frame))
 
-    def _declaration(self, frame: str) -> tuple[str, int]:
-        """Return what declares a frame, and where it is to be inserted; nothing where it is declared."""
+    def insert_via(self, line: int, frame: str, blend: float) -> None:
+        """Let the MOVE in a line go past a frame, behind those that it goes past already.
+
+        Args:
+            line: from 1.
+            frame: the frame.
+            blend: how far before it the corner may begin [m]; 0 for as far as the cell allows.
+
+        Raises:
+            ProgramTextError: there is no MOVE in it, or one that goes past no frames.
+        """
+        move = self.check_via(line)
+        past = next((it for it in move.clauses if isinstance(it, Via)), None)
+        between = self.text[move.goal.span.end : move.clauses[0].span.start] if move.clauses else ","
+        separator = "" if "," in between else ","
+        place = (
+            (move.goal.span.end, f" VIA ({frame}){separator}")
+            if past is None
+            else (past.points[-1].span.end, f", {frame}")
+        )
+        rounded = (0, "")
+        if blend and not any(isinstance(it, Blend) for it in move.clauses):
+            last = move.clauses[-1].span.end if move.clauses else move.goal.span.end
+            rounded = last, f", WITH BLEND = {blend * 1e3:g}mm"
+        self._insert(place, rounded, self._declaration(frame))
+
+    def check_via(self, line: int) -> Move:
+        """Return the MOVE in a line if it can go past a frame.
+
+        Raises:
+            ProgramTextError: there is no MOVE in it, or one that goes past no frames.
+        """
+        self.require_statements()
+        move = self._move_in(line)
+        plain = next((it for it in move.clauses if isinstance(it, Directly | Straightly)), None)
+        if plain is not None:
+            word = clause_word(type(plain))
+            raise ProgramTextError(f"the MOVE in line {line} goes {word}, which cannot be combined with VIA")
+        return move
+
+    def _insert(self, *pieces: tuple[int, str]) -> None:
+        """Insert texts at offsets; of two at the same place the first stands in front."""
+        text = self.text
+        for _, (offset, piece) in sorted(enumerate(pieces), key=lambda it: (it[1][0], it[0]), reverse=True):
+            text = text[:offset] + piece + text[offset:]
+        self.replace(text)
+
+    def _declaration(self, frame: str) -> tuple[int, str]:
+        """Return where what declares a frame is to be inserted, and that; nothing where it is declared."""
         program = self.compiled.tree
         if frame.upper() in self.compiled.symbols.declared:
-            return "", 0
+            return 0, ""
         for declared in program.declarations:
             if declared.type.key == "FRAME" and not declared.type.sizes:
-                return f", {frame}", declared.names[-1].span.end
+                return declared.names[-1].span.end, f", {frame}"
         behind = program.headers[-1].span.end if program.headers else 0
         begin = next(token for token in self.compiled.tokens if token.key == "BEGIN" and token.start >= behind)
-        return f"VAR {frame} : FRAME ;\n", begin.start
+        return begin.start, f"VAR {frame} : FRAME ;\n"
 
     def _place_behind(self, line: int) -> tuple[int, str]:
         """Return where a statement can be inserted behind a line, and the blanks in front of it."""
@@ -147,9 +276,9 @@ class ProgramText:
             line = source.line(program.statements[-1].span.end - 1)
         else:
             start, line = 0, source.line(program.end.start) - 1
-        lines = self.text.splitlines(keepends=True)
-        offset = sum(map(len, lines[:line]))
-        first = lines[start - 1] if start else "  "
+        starts = [*PositionCodec(self.text).line_starts, len(self.text)]
+        offset = starts[min(line, len(starts) - 1)]
+        first = self.text[starts[start - 1] : starts[start]] if start else "  "
         return offset, first[: len(first) - len(first.lstrip())]
 
     def goal_in(self, line: int) -> str:
@@ -205,13 +334,17 @@ class ProgramText:
             # A semicolon that stays behind separates empty statements.
             empty = "".join(c if c in "\r\n" else " " for c in text[it.span.start : it.span.end])
             text = text[: it.span.start] + empty + text[it.span.end :]
-        part = compile_program(Source(self.name, text), self._cell)
+        part = self._compiled(text)
         if part.code is None:
             error = next(it for it in part.diagnostics if it.is_error)
             raise ProgramTextError(f"from line {line} on the program cannot run by itself: {error.message}")
         return part
 
     # ---- what is shown -------------------------------------------------------------------------------------------
+
+    def _column(self, offset: int) -> int:
+        """Return an offset as pages count it."""
+        return column_count(self.text[:offset], UTF_16)
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of the program beside its text, as plain data."""
@@ -220,19 +353,20 @@ class ProgramText:
             "name": self.name,
             "changed": self.changed,
             "runs": self.compiled.code is not None,
-            "diagnostics": [
-                {
-                    "start": it.span.start,
-                    "end": it.span.end,
-                    "line": self.compiled.source.line(it.span.start),
-                    "severity": it.severity.value,
-                    "code": it.code,
-                    "text": it.message,
-                    "helps": list(it.helps),
-                    "fixes": [
-                        {"start": fix.span.start, "end": fix.span.end, "text": fix.replacement} for fix in it.fixes
-                    ],
-                }
-                for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]
+            "diagnostics": self._diagnostics,
+        }
+
+    def _diagnostic_state(self, it: Diagnostic) -> dict[str, Any]:
+        return {
+            "start": self._column(it.span.start),
+            "end": self._column(it.span.end),
+            "line": self.compiled.source.line(it.span.start),
+            "severity": it.severity.value,
+            "code": it.code,
+            "text": it.message,
+            "helps": list(it.helps),
+            "fixes": [
+                {"start": self._column(fix.span.start), "end": self._column(fix.span.end), "text": fix.replacement}
+                for fix in it.fixes
             ],
         }

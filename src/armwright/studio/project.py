@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import HardwareFactory
-from armwright.cell.simulator import Simulator
+from armwright.cell.model import Cell
 from armwright.errors import UnknownNameError
 from armwright.files.inputs import read_program
+from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.physics.world import PhysicsCell
+from armwright.program.api import add_imported_frames
+from armwright.studio.camera_view import CameraView
 from armwright.studio.cell_file import CellFile, TeachingError
+from armwright.studio.comparison import KeptMotion, kept_motion
 from armwright.studio.program_run import ProgramRun
-from armwright.studio.program_text import ProgramText, ProgramTextError
+from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError
 from armwright.studio.workbench import Workbench
 
-# Speeds of a MOVE.
-_SPEEDS = (1, 120)
 _MOST_BREAKPOINTS = 1000
 
 
@@ -31,6 +35,9 @@ class Project:
         program: its text.
         run: of the program; None where none runs.
         breakpoints: lines of the program.
+        devices: that are on, while no program runs.
+        compared: motions of earlier runs that are shown beside one another, at most two.
+        executor: computes runs beside whoever shows them; None for not beside.
     """
 
     def __init__(self, workbench: Workbench, file: CellFile | None = None, program: Path | None = None) -> None:
@@ -49,6 +56,10 @@ class Project:
         self.program = ProgramText(program, text, workbench.cell)
         self.run: ProgramRun | None = None
         self.breakpoints: set[int] = set()
+        self.devices: set[str] = set()
+        self.compared: list[KeptMotion] = []
+        self.executor: Executor | None = None
+        self._camera_view: tuple[Cell, CameraView] | None = None
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 
@@ -80,13 +91,13 @@ class Project:
         self._taught(file)
 
     def rename(self, name: str, new: str) -> None:
-        """Give a frame of the cell file another name."""
+        """Give a frame or a joint target of the cell file another name."""
         file = self._teachable()
         file.rename(name, new)
         self._taught(file)
 
     def forget(self, name: str) -> None:
-        """Take a frame out of the cell file."""
+        """Take a frame or a joint target out of the cell file."""
         file = self._teachable()
         file.forget(name)
         self._taught(file)
@@ -104,14 +115,24 @@ class Project:
         else:
             self.program.save()
 
-    def insert_move(self, arm: str, frame: str, line: int, *, straight: bool, speed: float) -> None:
+    def insert_move(self, arm: str, frame: str, line: int, form: MoveForm) -> None:
         """Teach a frame where the tool is, and insert a MOVE to it behind a line; both or neither."""
-        least, most = _SPEEDS
-        if not least <= speed <= most:
-            raise ProgramTextError(f"speed: expected {least} to {most}, got {speed:g}")
+        form.clauses(arm, frame)
         self.program.require_statements()
         self.teach(arm, frame)
-        self.program.insert_move(line, arm, frame.upper(), straight=straight, speed=speed)
+        self.program.insert_move(line, arm, frame.upper(), form)
+
+    def insert_via(self, arm: str, frame: str, line: int, blend: float) -> None:
+        """Teach a frame where the tool is, and let the MOVE in a line go past it; both or neither."""
+        self.program.check_via(line)
+        self.teach(arm, frame)
+        self.program.insert_via(line, frame.upper(), blend)
+
+    def teach_joints(self, arm: str, name: str) -> None:
+        """Give a joint target the configuration of an arm; it is added where there is none."""
+        file = self._teachable()
+        file.teach_joints(name, arm, self.workbench.arm(arm).q)
+        self._taught(file)
 
     def touch_up(self, line: int) -> None:
         """Give the goal of the MOVE in a line the pose of the tool."""
@@ -161,12 +182,13 @@ class Project:
         compiled, cell = self.program.compiled, self.workbench.cell
         if line:
             compiled, cell = self.program.part_from(line, only=only), self.workbench.cell_as_shown()
+        cell = add_imported_frames(cell, compiled.imports) or cell
         if compiled.code is None:
             error = next(it for it in compiled.diagnostics if it.is_error)
             where = compiled.source.line(error.span.start)
             raise ProgramTextError(f"line {where}: {error.code}: {error.message}")
-        hardware: HardwareFactory = PhysicsCell if physics else Simulator
-        self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints)
+        hardware: HardwareFactory = PhysicsCell if physics else kinematic_cell
+        self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints, self.executor)
         self.run.begin(stop_on_entry=entry)
 
     def running(self) -> ProgramRun:
@@ -183,6 +205,48 @@ class Project:
         """End the run; the arms stay where they are shown."""
         self.running()
         self.run = None
+
+    def operate(self, device: str, *, on: bool) -> None:
+        """Switch a device of the cell.
+
+        Raises:
+            UnknownNameError: there is none of this name.
+        """
+        known = self._known_devices()
+        if device not in known:
+            raise UnknownNameError("device", device, known)
+        (self.devices.add if on else self.devices.discard)(device)
+
+    def _known_devices(self) -> list[str]:
+        """Return the devices of the cell, and those that a run has switched."""
+        switched = {} if self.run is None else self.run.devices()
+        return sorted({*(self.workbench.cell.devices or ()), *switched})
+
+    def _device_states(self) -> dict[str, bool]:
+        switched = dict.fromkeys(self.devices, True) if self.run is None else self.run.devices()
+        return {name: switched.get(name, False) for name in self._known_devices()}
+
+    def camera_picture(self, camera: str) -> Callable[[], bytes]:
+        """Return what takes a picture of the cell as it is shown, in whatever thread takes all of them.
+
+        Raises:
+            UnknownNameError: there is no camera of this name.
+        """
+        cell = self.workbench.cell
+        if camera not in cell.cameras:
+            raise UnknownNameError("camera", camera, cell.cameras)
+        configurations, parts = self.workbench.configurations(), self.workbench.part_poses()
+
+        def take() -> bytes:
+            if self._camera_view is None or self._camera_view[0] is not cell:
+                self._camera_view = cell, CameraView(cell)
+            return self._camera_view[1].picture(camera, configurations, parts)
+
+        return take
+
+    def keep_motion(self) -> None:
+        """Keep the motion of the run, to be compared with another one; of three the first is forgotten."""
+        self.compared = [*self.compared, kept_motion(self.running().recording(), len(self.compared) + 1)][-2:]
 
     def tick(self, seconds: float) -> bool:
         """Let the run go on for a time [s]; return whether anything has changed."""
@@ -201,4 +265,5 @@ class Project:
             "program": {**self.program.state(), "breakpoints": sorted(self.breakpoints)},
             "run": None if self.run is None else self.run.state(),
             "file": taught,
+            "devices": self._device_states(),
         }

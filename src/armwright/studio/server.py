@@ -11,6 +11,7 @@ import secrets
 import signal
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -18,7 +19,6 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
-from armwright.studio.downloads import Download
 from armwright.studio.messages import MAX_MESSAGE
 from armwright.studio.page import studio_page
 from armwright.studio.studio import Studio
@@ -72,6 +72,9 @@ class Server:
         self._pages: dict[int, _Page] = {}
         self._count = 0
         self._sending: set[asyncio.Task[None]] = set()
+        # One thread makes all that is asked for, for pictures have to be taken by one; another one computes runs.
+        self._jobs, self._runs = (ThreadPoolExecutor(1, f"studio-{name}") for name in ("jobs", "runs"))
+        studio.project.executor = self._runs
 
     @property
     def address(self) -> str:
@@ -170,16 +173,16 @@ class Server:
             self._changed()
         while self.studio.jobs:
             number, job = self.studio.jobs.pop()
-            task = asyncio.create_task(self._send_file(number, job))
+            task = asyncio.create_task(self._send_answer(number, job))
             self._sending.add(task)
             task.add_done_callback(self._sending.discard)
 
-    async def _send_file(self, number: int, job: Callable[[], Download]) -> None:
-        """Make a file beside all else, and send it to the page that has asked for it."""
+    async def _send_answer(self, number: int, job: Callable[[], dict[str, Any]]) -> None:
+        """Make a message beside all else, and send it to the page that has asked for it."""
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
 
         try:
-            made = await asyncio.get_running_loop().run_in_executor(None, job)
+            made = await asyncio.get_running_loop().run_in_executor(self._jobs, job)
         except ArmwrightError as error:
             self.studio.refuse(number, error)
             self._changed()
@@ -187,7 +190,7 @@ class Server:
         page = self._pages.get(number)
         if page is not None:
             with contextlib.suppress(ConnectionClosed):
-                await page.socket.send(json.dumps(made.message()))
+                await page.socket.send(json.dumps(made))
 
     def _changed(self) -> None:
         for page in self._pages.values():
@@ -271,6 +274,8 @@ class Server:
             finally:
                 waiting.cancel()
                 ticking.cancel()
+                for executor in (self._jobs, self._runs):
+                    executor.shutdown(wait=False, cancel_futures=True)
 
 
 def serve(studio: Studio, announce: Callable[[str], None], port: int = 0) -> None:

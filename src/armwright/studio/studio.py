@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
+from armwright.cell.observations import Picture
 from armwright.errors import ArmwrightError
 from armwright.studio import messages as m
 from armwright.studio.control import Control
-from armwright.studio.downloads import Download, download
+from armwright.studio.downloads import download
 from armwright.studio.messages import MessageError, read_message
+from armwright.studio.program_text import MoveForm
 from armwright.studio.project import Project
 
 # Jogging stops so long after the latest message that keeps it going [s].
@@ -26,10 +28,12 @@ _NOT_IN_A_RUN = (
     m.Jog,
     m.TakeSolution,
     m.Grip,
+    m.Operate,
     m.Undo,
     m.GoTo,
     m.SetText,
     m.InsertMove,
+    m.InsertVia,
     m.TouchUp,
     m.Run,
     m.Reset,
@@ -43,18 +47,17 @@ class Studio:
         workbench: the arms.
         project: the files.
         control: which page commands.
-        jobs: files that pages have asked for, each with the number of the page; whoever serves the pages makes them.
+        jobs: messages that pages have asked for, each with the number of the page; whoever serves the pages makes them.
     """
 
     def __init__(self, project: Project) -> None:
         """Take a project that no page commands yet."""
         self.project, self.workbench, self.control = project, project.workbench, Control()
-        self.jobs: list[tuple[int, Callable[[], Download]]] = []
-        # The version of the program that each page has, and why its latest command was not done.
-        self._versions: dict[int, int] = {}
+        self.jobs: list[tuple[int, Callable[[], dict[str, Any]]]] = []
+        # Why the latest command of each page was not done.
         self._refusals: dict[int, str] = {}
-        # The map that each page has, and whether all of it.
-        self._maps: dict[int, tuple[int, bool]] = {}
+        # What each page has of what is sent only when it changes, by its key in the state.
+        self._sent: dict[int, dict[str, object]] = {}
         # What is being jogged, and until when.
         self._jog: m.Jog | None = None
         self._jog_until = -math.inf
@@ -68,9 +71,8 @@ class Studio:
         if page == self.control.page:
             self._jog = None
         self.control.close(page)
-        self._versions.pop(page, None)
         self._refusals.pop(page, None)
-        self._maps.pop(page, None)
+        self._sent.pop(page, None)
 
     def receive(self, text: str | bytes, page: int, now: float) -> bool:
         """Do what a page asks for; return whether anything may have changed.
@@ -88,6 +90,7 @@ class Studio:
             self._do_moving(command, page, now)
             self._do_teaching(command)
             self._do_running(command, page)
+            self._answer(command, page)
             self._refusals.pop(page, None)
         except ArmwrightError as error:
             self._refusals[page] = str(error)
@@ -111,7 +114,7 @@ class Studio:
             case m.MoveTool():
                 bench.move_tool(command.arm, command.pose, now, leaping=command.leaping)
             case m.GoTo():
-                bench.go_to(command.arm, command.frame, now)
+                bench.go_to(command.arm, command.name, now)
             case m.TakeSolution():
                 bench.take_solution(command.arm, command.number, now)
             case m.Jog():
@@ -121,6 +124,8 @@ class Studio:
                 self._jog, self._jog_until = command, now + _JOG_TIMEOUT
             case m.Halt():
                 self._jog = None
+            case m.Operate():
+                self.project.operate(command.device, on=command.on)
             case m.Grip():
                 bench.grip(command.arm, open_it=command.open, now=now)
             case m.Undo():
@@ -130,7 +135,7 @@ class Studio:
             case m.Map():
                 bench.show_map(command.arm, None if command.plane == "none" else command.plane)
             case m.Preview():
-                bench.preview(command.arm, command.frame)
+                bench.preview(command.arm, command.name)
             case m.AskForControl():
                 self.control.ask(page, now)
             case m.AnswerRequest():
@@ -142,6 +147,8 @@ class Studio:
         match command:
             case m.Teach():
                 project.teach(command.arm, command.name, command.on)
+            case m.TeachJoints():
+                project.teach_joints(command.arm, command.name)
             case m.Rename():
                 project.rename(command.name, command.to)
             case m.Forget():
@@ -151,10 +158,30 @@ class Studio:
             case m.Save():
                 project.save(command.what)
             case m.InsertMove():
-                straight, speed = command.straight, command.speed
-                project.insert_move(command.arm, command.frame, command.line, straight=straight, speed=speed)
+                form = MoveForm(command.straight, command.approach, command.departure, command.speed)
+                project.insert_move(command.arm, command.frame, command.line, form)
+            case m.InsertVia():
+                project.insert_via(command.arm, command.frame, command.line, command.blend)
             case m.TouchUp():
                 project.touch_up(command.line)
+
+    def _answer(self, command: m.Command, page: int) -> None:
+        """Answer what a page asks for that changes nothing."""
+        project, program = self.project, self.project.program
+        match command:
+            case m.Keep():
+                self.workbench.arm(command.arm)
+                recording, what, arm = project.running().recording(), command.what, command.arm
+                self.jobs.append((page, lambda: download(recording, what, arm).message()))
+            case m.Look():
+                take, camera = project.camera_picture(command.camera), command.camera
+                self.jobs.append((page, lambda: _picture_message(camera, take())))
+            case m.Complete():
+                items = program.completions(command.text, command.offset)
+                self.jobs.append((page, lambda: {"completions": items}))
+            case m.Describe():
+                text = program.description(command.offset)
+                self.jobs.append((page, lambda: {"description": text}))
 
     def _do_running(self, command: m.Command, page: int) -> None:
         project = self.project
@@ -162,7 +189,7 @@ class Studio:
             case m.SetText():
                 project.set_text(command.text, command.version)
                 # The page has it: it is not sent back.
-                self._versions[page] = project.program.version
+                self._sent.setdefault(page, {})["source"] = project.program.version
             case m.Break():
                 project.set_breakpoint(command.line, on=command.on)
             case m.Run():
@@ -173,10 +200,8 @@ class Studio:
                 project.running().pause()
             case m.Stop():
                 project.stop()
-            case m.Keep():
-                self.workbench.arm(command.arm)
-                recording = project.running().recording()
-                self.jobs.append((page, partial(download, recording, command.what, command.arm)))
+            case m.KeepMotion():
+                project.keep_motion()
             case m.Pace():
                 least, most = _RATES
                 if not least <= command.rate <= most:
@@ -228,12 +253,45 @@ class Studio:
             "refusal": self._refusals.get(page, ""),
             "control": self.control.state(page),
         }
-        program = self.project.program
-        if self._versions.get(page) != program.version:
-            self._versions[page] = program.version
-            state["program"]["source"] = program.text
-        shown = self.workbench.map_number, self.workbench.map is not None and self.workbench.map.done
-        if self._maps.get(page, (0, False)) != shown:
-            self._maps[page] = shown
-            state["map"] = None if self.workbench.map is None else self.workbench.map.state()
+        sent = self._sent.setdefault(page, {})
+        for name, (key, value) in self._seldom_changed().items():
+            if sent.get(name) != key:
+                sent[name] = key
+                state[name] = value()
         return state
+
+    def _seldom_changed(self) -> dict[str, tuple[object, Callable[[], Any]]]:
+        """Return what is sent only when it changes: by its key in the state what tells that, and how it is had."""
+        project, bench, run = self.project, self.workbench, self.project.run
+        arms = bench.arms
+        pictures = () if run is None else run.pictures()
+        return {
+            "source": (project.program.version, lambda: project.program.text),
+            "map": (
+                (bench.map_number, bench.map is not None and bench.map.done),
+                lambda: None if bench.map is None else bench.map.state(),
+            ),
+            "paths": (
+                (id(run), 0 if run is None else run.path_number),
+                lambda: {} if run is None else {name: run.path(name) for name in arms},
+            ),
+            "compared": (
+                tuple(motion.number for motion in project.compared),
+                lambda: [motion.state() for motion in project.compared],
+            ),
+            "picture": (
+                (id(run), len(pictures), pictures[-1].time if pictures else None),
+                lambda: _picture_state(pictures[-1]) if pictures else None,
+            ),
+        }
+
+
+def _picture_message(camera: str, content: bytes) -> dict[str, Any]:
+    return {"picture": {"camera": camera, "png": base64.b64encode(content).decode(), "text": "", "found": None}}
+
+
+def _picture_state(picture: Picture) -> dict[str, Any]:
+    """Return a picture that a camera has taken in a run, as plain data."""
+    text = f"{picture.time:.2f} s, {picture.text}"
+    png = base64.b64encode(picture.png).decode()
+    return {"camera": picture.camera, "png": png, "text": text, "found": picture.found}

@@ -126,7 +126,7 @@ def live_widget(cell: Cell) -> Any:
             tell()
         while studio.jobs:
             _, job = studio.jobs.pop()
-            widget.send(json.dumps(job().message()))
+            widget.send(json.dumps(job()))
         ticking[:] = [task for task in ticking if not task.done()]
         with contextlib.suppress(RuntimeError):
             if studio.moves and not ticking:

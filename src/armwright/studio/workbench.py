@@ -151,14 +151,27 @@ class Workbench:
             raise UnknownNameError("frame", frame, ["BASE", "TOOL", "WORLD", *poses])
         return poses[frame][:3, :3]
 
-    def go_to(self, name: str, frame: str, now: float) -> None:
-        """Bring the tool of an arm to a frame."""
-        poses = self.frame_poses()
-        if frame not in poses:
-            raise UnknownNameError("frame", frame, poses)
-        arm = self.arm(name)
-        self._changing(arm, f"go to {frame}", now)
-        arm.move_tool(poses[frame], leaping=True)
+    def go_to(self, name: str, goal: str, now: float) -> None:
+        """Bring the tool of an arm to a frame, or the arm to a joint target."""
+        arm, q = self.arm(name), self._configuration_at(name, goal)
+        self._changing(arm, f"go to {goal}", now)
+        arm.set_joints(q)
+
+    def _configuration_at(self, name: str, goal: str) -> Array:
+        """Return the configuration (n,) in which an arm is at a frame or a joint target.
+
+        Raises:
+            UnknownNameError: there is neither.
+            UnreachableError: the arm cannot be there.
+        """
+        poses, targets = self.frame_poses(), self.cell.joint_targets
+        if goal in poses:
+            return self.arm(name).configuration_for(poses[goal])
+        if goal not in targets:
+            raise UnknownNameError("frame or joint target", goal, [*poses, *targets])
+        if targets[goal].arm != name:
+            raise UnreachableError(f"{goal} is a configuration of {targets[goal].arm}")
+        return targets[goal].q
 
     def take_solution(self, name: str, number: int, now: float) -> None:
         """Take another configuration that brings the tool to where it is, by its number, from 0."""
@@ -212,15 +225,24 @@ class Workbench:
         self._parts, self._tree, self._spelled = PartPoses(self.cell), self.cell.tree(), str
         self._checks = self._followed = None
 
+    def configurations(self) -> dict[str, Array]:
+        """Return the joint positions (n,) of the arms."""
+        return {name: arm.q for name, arm in self.arms.items()}
+
+    def part_poses(self) -> dict[str, Array]:
+        """Return the poses (4, 4) of the parts in the world."""
+        hands = {name: arm.tool for name, arm in self.arms.items()}
+        return {name: self._parts.in_world(name, hands) for name in self.cell.parts}
+
     def cell_as_shown(self) -> Cell:
         """Return the cell with arms and parts where they are shown."""
-        hands = {name: arm.tool for name, arm in self.arms.items()}
+        poses = self.part_poses()
         arms = {name: attrs.evolve(it, start=self.arms[name].q) for name, it in self.cell.arms.items()}
-        parts = {name: attrs.evolve(it, pose=self._parts.in_world(name, hands)) for name, it in self.cell.parts.items()}
+        parts = {name: attrs.evolve(it, pose=poses[name]) for name, it in self.cell.parts.items()}
         return attrs.evolve(self.cell, arms=arms, parts=parts)
 
     def take_frames(self, cell: Cell) -> None:
-        """Take the frames of a cell that differs in nothing else."""
+        """Take the frames and joint targets of a cell that differs in nothing else."""
         self.cell, self._tree, self._spelled = cell, cell.tree(), str
 
     # ---- maps and previews ---------------------------------------------------------------------------------------
@@ -237,15 +259,11 @@ class Workbench:
         self.map.step()
         return self.map.done
 
-    def preview(self, name: str, frame: str) -> None:
-        """Show where an arm would be with its tool at a frame; without a name, show that no more."""
+    def preview(self, name: str, goal: str) -> None:
+        """Show where an arm would be at a frame or a joint target; without a name, show that no more."""
         self._ghost = None
-        if not frame:
-            return
-        arm, poses = self.arm(name), self.frame_poses()
-        if frame not in poses:
-            raise UnknownNameError("frame", frame, poses)
-        self._ghost = name, arm.configuration_for(poses[frame])
+        if goal:
+            self._ghost = self.arm(name).name, self._configuration_at(name, goal)
 
     # ---- what is shown -------------------------------------------------------------------------------------------
 
@@ -264,7 +282,7 @@ class Workbench:
         """Return the two bodies that are nearest to one another; None where nothing is near, or nothing can meet."""
         if self._checks is None:
             self._checks = self._collisions.at_configurations(self._parts)
-        return self._checks.nearest({name: arm.q for name, arm in self.arms.items()}, _NEAR)
+        return self._checks.nearest(self.configurations(), _NEAR)
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows, as plain data."""
@@ -273,6 +291,7 @@ class Workbench:
             "arms": {name: self._arm_state(arm) for name, arm in self.arms.items()},
             "parts": {name: self._part_state(name) for name in self.cell.parts},
             "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},
+            "targets": {name: {"arm": it.arm, "q": _rounded(it.q)} for name, it in self.cell.joint_targets.items()},
             "near": self._near_state(),
             "ghost": None if self._ghost is None else {"arm": self._ghost[0], "q": _rounded(self._ghost[1])},
             "undo": len(self._undo),

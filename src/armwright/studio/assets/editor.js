@@ -67,11 +67,11 @@ function sendText() {
 
 function showEditor(state) {
   const { program, run } = state;
-  if (program.source !== undefined && (program.version !== editor.version || !editor.timer)) {
+  if (state.source !== undefined && (program.version !== editor.version || !editor.timer)) {
     const field = byId("text");
-    if (field.value !== program.source) {
+    if (field.value !== state.source) {
       const at = field.selectionStart;
-      field.value = program.source;
+      field.value = state.source;
       field.setSelectionRange(at, at);
     }
     editor.version = program.version;

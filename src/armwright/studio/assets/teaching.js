@@ -5,11 +5,11 @@ const editorLine = () => byId("text").value.slice(0, byId("text").selectionStart
 function frameItem(name) {
   const arm = () => chosenArm().name;
   const go = make("button", { type: "button", textContent: "Go", title: `Bring the tool to ${name}` });
-  go.addEventListener("click", () => send({ do: "go to", arm: arm(), frame: name }));
+  go.addEventListener("click", () => send({ do: "go to", arm: arm(), name }));
   whilePointedAt(
     go,
-    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), frame: name }, "preview"),
-    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), frame: "" }, "preview"),
+    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), name }, "preview"),
+    () => mine() && !live.state.run && send({ do: "preview", arm: arm(), name: "" }, "preview"),
   );
   const update = make("button", { type: "button", textContent: "Teach", title: `Give ${name} the pose of the tool` });
   update.addEventListener("click", () => send({ do: "teach", arm: arm(), name }));
