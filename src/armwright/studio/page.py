@@ -30,8 +30,11 @@ _SCRIPTS = (
     "pendant.js",
     "teaching.js",
     "editor.js",
+    "assistance.js",
     "running.js",
     "charts_live.js",
+    "cell_panel.js",
+    "comparing.js",
     "studio.js",
 )
 
@@ -82,6 +85,7 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
         "effects": [],
         "arms": [arm_record(name, cell.arms[name].arm, still[name], cell.arms[name].base) for name in cell.arms],
         "animation": animation,
+        "cameras": list(cell.cameras),
         "version": __version__,
         "words": {
             "declaration": sorted(DECLARATIONS),

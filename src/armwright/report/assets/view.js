@@ -218,6 +218,8 @@ function look(name) {
 // A button for the planned arm, where the view draws a measured one.
 function startPlanned() {
   const button = document.getElementById("planned");
+  // Live views have none.
+  if (!button) return;
   const measured = Object.values(data.animation?.arms ?? {}).some((figure) => figure.planned);
   document.getElementById("planned-choice").hidden = !measured;
   button.addEventListener("click", () => {

@@ -61,8 +61,9 @@ function fillGutter(lines) {
 function sendText() {
   clearTimeout(editor.timer);
   editor.timer = null;
-  send({ do: "text", text: byId("text").value, version: editor.version }, "text");
-  editor.version++;
+  // A text that still waits is replaced, and was made from what the new one was made from.
+  const waiting = live.queue.get("text");
+  send({ do: "text", text: byId("text").value, version: waiting ? waiting.version : editor.version++ }, "text");
 }
 
 function showEditor(state) {
@@ -87,6 +88,7 @@ function showEditor(state) {
     paintText();
     showProblems(byId("text").value.trim() ? program.diagnostics : []);
   }
+  followLine(run?.lines[0]?.line);
   const running = new Map((run?.lines ?? []).map((it) => [it.line, it]));
   [...byId("gutter").children].forEach((button, i) => {
     button.ariaPressed = String(breakpoints.has(i + 1));
@@ -95,6 +97,18 @@ function showEditor(state) {
     button.style.setProperty("--hue", it ? armColour(Math.max(0, data.arms.findIndex(({ name }) => name === it.arm))) : "");
     button.title = it ? it.process : "";
   });
+}
+
+// The line that runs stays in sight, unless somebody looks elsewhere.
+function followLine(line) {
+  const field = byId("text");
+  if (line === editor.followed || !line) {
+    editor.followed = line;
+    return;
+  }
+  editor.followed = line;
+  const [top, high] = [(line - 1) * 20, field.clientHeight];
+  if (document.activeElement !== field && (top < field.scrollTop || top > field.scrollTop + high - 40)) field.scrollTop = top - high / 3;
 }
 
 function showProblems(diagnostics) {

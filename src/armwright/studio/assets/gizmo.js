@@ -112,9 +112,12 @@ function drag(x, y) {
   send({ do: "tool", arm: chosenArm().name, pose: gizmo.target }, "tool");
 }
 
+// A program that runs moves the arms by itself.
+const canMove = () => mine() && !live.state.run;
+
 function paintGizmo() {
   const X = toolPose();
-  if (!X || !mine()) return;
+  if (!X || !canMove()) return;
   const shades = [colours.red, colours.green, colours.blue];
   pen.lineCap = "round";
   for (const handle of handles()) {
@@ -156,7 +159,7 @@ function startGizmo() {
   canvas.addEventListener(
     "pointerdown",
     (event) => {
-      if (!mine() || event.button !== 0) return;
+      if (!canMove() || event.button !== 0) return;
       const handle = handleAt(...place(event));
       if (!handle) return;
       event.stopImmediatePropagation();
@@ -176,7 +179,7 @@ function startGizmo() {
         return;
       }
       if (event.buttons) return;
-      const hover = mine() ? handleAt(...place(event)) : null;
+      const hover = canMove() ? handleAt(...place(event)) : null;
       if (hover?.kind !== gizmo.hover?.kind || hover?.k !== gizmo.hover?.k) {
         gizmo.hover = hover;
         canvas.style.cursor = hover ? "pointer" : "";

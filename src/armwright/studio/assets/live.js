@@ -3,6 +3,8 @@
 const RETRY = 500; // [ms]
 const live = { socket: null, awaiting: false, queue: new Map(), state: null, taken: 0, lost: false };
 const followers = [];
+// What takes a message that is no state, by the only key of that.
+const answers = {};
 
 // `key` names what a message replaces while it waits.
 function send(message, key = `${message.do} ${live.taken++}`) {
@@ -36,8 +38,9 @@ function flush() {
 
 function receive(text) {
   const message = JSON.parse(text);
-  if (message.download) {
-    keepFile(message.download);
+  const [answer] = Object.keys(message);
+  if (answers[answer]) {
+    answers[answer](message[answer]);
     return;
   }
   const first = !live.state;

@@ -29,6 +29,7 @@ function showRun(state) {
   byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
   showTrace(run?.trace ?? null);
+  showVariables(run?.variables ?? []);
 }
 
 function showTrace(trace) {
@@ -77,7 +78,17 @@ function toggleVideo() {
   button.textContent = "End the video";
 }
 
+function showVariables(variables) {
+  byId("variables-card").hidden = !variables.length;
+  const key = JSON.stringify(variables);
+  const list = byId("variables");
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.replaceChildren(...variables.map(({ name, value, type }) => make("li", { title: type }, make("b", { textContent: name }), make("span", { textContent: value }))));
+}
+
 function startRunning() {
+  answers.download = keepFile;
   byId("video").addEventListener("click", toggleVideo);
   for (const button of document.querySelectorAll("[data-keep]"))
     button.addEventListener("click", () => send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name }));

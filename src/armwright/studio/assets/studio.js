@@ -11,6 +11,7 @@ function drawSoon() {
     drawView();
     if (pen && lens) {
       paintMap();
+      paintPaths();
       paintGhost();
       paintGizmo();
     }
@@ -86,6 +87,7 @@ function takeArm(i) {
   });
   fillPendant();
   showPendant(live.state);
+  showComparison();
   drawSoon();
 }
 
@@ -108,7 +110,10 @@ function start() {
   startPendant();
   startTeaching();
   startEditor();
+  startAssistance();
   startRunning();
+  startCellPanel();
+  startComparing();
   if (data.arms.length > 1)
     byId("arms").append(
       ...data.arms.map(({ name }, i) => {

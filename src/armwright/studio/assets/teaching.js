@@ -2,17 +2,18 @@
 
 const editorLine = () => byId("text").value.slice(0, byId("text").selectionStart).split("\n").length;
 
-function frameItem(name) {
-  const arm = () => chosenArm().name;
-  const go = make("button", { type: "button", textContent: "Go", title: `Bring the tool to ${name}` });
+// Of what is taught, a frame or a joint target, with what can be done with it.
+function taughtItem(name, isTarget) {
+  const arm = () => (isTarget ? live.state.targets[name].arm : chosenArm().name);
+  const go = make("button", { type: "button", textContent: "Go", title: isTarget ? `Bring the joints to ${name}` : `Bring the tool to ${name}` });
   go.addEventListener("click", () => send({ do: "go to", arm: arm(), name }));
   whilePointedAt(
     go,
     () => mine() && !live.state.run && send({ do: "preview", arm: arm(), name }, "preview"),
     () => mine() && !live.state.run && send({ do: "preview", arm: arm(), name: "" }, "preview"),
   );
-  const update = make("button", { type: "button", textContent: "Teach", title: `Give ${name} the pose of the tool` });
-  update.addEventListener("click", () => send({ do: "teach", arm: arm(), name }));
+  const update = make("button", { type: "button", textContent: "Teach", title: isTarget ? `Give ${name} the joint positions shown` : `Give ${name} the pose of the tool` });
+  update.addEventListener("click", () => send({ do: isTarget ? "teach joints" : "teach", arm: arm(), name }));
   const rename = make("button", { type: "button", textContent: "Rename" });
   rename.addEventListener("click", () => {
     const to = make("input", { type: "text", value: name, ariaLabel: `New name of ${name}` });
@@ -35,21 +36,26 @@ function frameItem(name) {
 function showTeaching(state) {
   const file = state.file;
   byId("file-name").textContent = file ? `into ${file.name}` : "there is no cell file: begin one with --new";
-  const names = Object.keys(state.frames);
+  const [frames, targets] = [Object.keys(state.frames), Object.keys(state.targets)];
+  const names = [...frames, ...targets];
   const list = byId("frames");
-  if (list.dataset.names !== JSON.stringify([names, file?.frames])) {
-    list.dataset.names = JSON.stringify([names, file?.frames]);
-    list.replaceChildren(...names.map(frameItem));
-    for (const item of list.children)
-      for (const button of [...item.querySelectorAll("button")].slice(1))
-        button.hidden = !file?.frames.includes(item.dataset.name);
+  const key = JSON.stringify([frames, targets, file?.frames]);
+  if (list.dataset.names !== key) {
+    list.dataset.names = key;
+    list.replaceChildren(...names.map((name, i) => taughtItem(name, i >= frames.length)));
+    frames.forEach((name, i) => {
+      for (const button of [...list.children[i].querySelectorAll("button")].slice(1)) button.hidden = !file?.frames.includes(name);
+    });
     const on = byId("teach-on");
     const before = on.value || "WORLD";
-    on.replaceChildren(...["WORLD", ...names].map((name) => make("option", { value: name, textContent: name })));
-    on.value = ["WORLD", ...names].includes(before) ? before : "WORLD";
-    followFrames(names);
+    on.replaceChildren(...["WORLD", ...frames].map((name) => make("option", { value: name, textContent: name })));
+    on.value = ["WORLD", ...frames].includes(before) ? before : "WORLD";
+    followFrames(frames);
   }
-  for (const item of list.children) item.children[1].textContent = `${placeText(state.frames[item.dataset.name].slice(9))} mm`;
+  names.forEach((name, i) => {
+    const target = state.targets[name];
+    list.children[i].children[1].textContent = target ? `joints${data.arms.length > 1 ? ` of ${target.arm}` : ""}` : `${placeText(state.frames[name].slice(9))} mm`;
+  });
   byId("change-card").hidden = !file?.change;
   if (byId("change").textContent !== (file?.change ?? "")) showChange(file?.change ?? "");
   if (!byId("teach-name").value && document.activeElement !== byId("teach-name")) byId("teach-name").value = freeName(names);
@@ -83,16 +89,31 @@ function startTeaching() {
     send({ do: "teach", arm: chosenArm().name, name: name.value, on: byId("teach-on").value });
     taught();
   });
+  byId("teach-joints").addEventListener("click", () => {
+    send({ do: "teach joints", arm: chosenArm().name, name: name.value });
+    taught();
+  });
+  const form = byId("insert-form");
+  const value = (id, unit = 1) => (byId(id).closest("label").hidden ? 0 : Number(byId(id).value) / unit);
+  // Of the fields only those are shown that the form has.
+  const choose = () => {
+    for (const label of byId("insert").querySelectorAll("[data-of]")) label.hidden = !label.dataset.of.split(" ").includes(form.value);
+  };
+  form.addEventListener("change", choose);
+  choose();
   byId("insert").addEventListener("submit", (event) => {
     event.preventDefault();
-    send({
-      do: "insert",
-      arm: chosenArm().name,
-      frame: name.value || freeName(Object.keys(live.state.frames)),
-      line: editorLine(),
-      straight: byId("insert-way").value === "straight",
-      speed: Number(byId("insert-speed").value),
-    });
+    const common = { arm: chosenArm().name, frame: name.value || freeName([...Object.keys(live.state.frames), ...Object.keys(live.state.targets)]), line: editorLine() };
+    if (form.value === "via") send({ do: "via", ...common, blend: value("insert-blend", MILLIMETRES) });
+    else
+      send({
+        do: "insert",
+        ...common,
+        straight: form.value === "straight",
+        approach: value("insert-approach", MILLIMETRES),
+        departure: value("insert-departure", MILLIMETRES),
+        speed: value("insert-speed"),
+      });
     taught();
   });
   byId("touch-up").addEventListener("click", () => send({ do: "touch up", line: editorLine() }));
