@@ -148,7 +148,7 @@ def test_teach_and_save(opened: Opened) -> None:
     page, file = opened.page, opened.folder / "bench.toml"
     page.get_by_role("tab", name="Teach").click()
     page.get_by_label("Name").fill("pick")
-    page.get_by_role("button", name="Teach and insert MOVE").click()
+    page.get_by_role("button", name="Teach and insert").click()
     opened.until(lambda: "PICK" in opened.state()["frames"])
 
     assert "+PICK" in page.locator("#change").inner_text()
@@ -202,3 +202,127 @@ def test_a_lost_server(opened: Opened) -> None:
     page.locator("#joint-1").focus()
     page.keyboard.press("End")
     opened.until(lambda: opened.state()["arms"]["ARM_1"]["q"][0] > 2.0)
+
+
+def test_completion(opened: Opened) -> None:
+    """While a word is typed the words that fit are listed; Enter takes one, Escape none; F1 tells what stands there."""
+    page = opened.page
+    text = page.locator("#text")
+    text.click()
+    page.keyboard.press("Control+Home")
+    for _ in range(2):
+        page.keyboard.press("ArrowDown")
+    page.keyboard.press("Home")
+    page.keyboard.type("  MOVE ARM_1 TO hi")
+    page.locator("#completions li").first.wait_for()
+    assert page.locator("#completions [aria-selected=true] b").inner_text() == "high"
+    page.keyboard.press("Enter")
+    assert "  MOVE ARM_1 TO high" in text.input_value()
+    assert page.locator("#completions").is_hidden()
+    page.keyboard.type(" ;\n")
+    opened.until(lambda: not opened.state()["program"]["diagnostics"])
+    page.keyboard.type("  MO")
+    page.locator("#completions li").first.wait_for()
+    page.keyboard.press("Escape")
+    assert page.locator("#completions").is_hidden()
+    page.keyboard.press("Backspace")
+    page.keyboard.press("Backspace")
+    opened.until(lambda: not opened.state()["program"]["diagnostics"])
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("Home")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("F1")
+    page.locator("#description").wait_for()
+    assert "MOVE" in page.locator("#description").inner_text()
+
+
+def test_two_pages(opened: Opened, browser: Any) -> None:
+    """Two pages show one state; the second may command when the first hands over, and goes on when that is closed."""
+    first, other = opened.page, browser.new_page()
+    try:
+        second = Opened(other, first.url, opened.folder)
+        assert "has control" in other.locator("#link").inner_text()
+        assert other.locator("#joint-1").is_disabled()
+        first.locator("#joint-1").focus()
+        first.keyboard.press("End")
+        second.until(lambda: second.state()["arms"]["ARM_1"]["q"][0] > 2.0)
+        other.get_by_role("button", name="Ask for control").click()
+        first.get_by_role("button", name="Hand over").click()
+        second.until(lambda: not other.locator("#joint-1").is_disabled())
+        opened.until(lambda: first.locator("#joint-1").is_disabled())
+    finally:
+        other.close()
+    opened.until(lambda: not first.locator("#joint-1").is_disabled())
+
+
+def test_compared(opened: Opened) -> None:
+    """Two motions of a program stand beside one another, each with its chart."""
+    page = opened.page
+    page.get_by_role("tab", name="Run").click()
+    page.locator("#pace").select_option("4")
+    for speed in (100, 50):
+        page.locator("#text").fill(PROGRAM.replace("TO high ;", f"TO high WITH SPEED = {speed} ;"))
+        opened.until(lambda: page.evaluate("!studio.live.awaiting && !studio.live.queue.size"))
+        opened.until(lambda: not page.locator("#run").is_disabled())
+        page.locator("#run").click()
+        opened.until(lambda: (opened.state()["run"] or {}).get("reason") == "end")
+        page.locator("#keep-motion").click()
+        opened.until(lambda: not page.locator("#keep-motion").is_disabled())
+        page.locator("#stop").click()
+        opened.until(lambda: opened.state()["run"] is None)
+    heads = page.locator("#compare-figures thead th").all_inner_texts()
+    assert [head[:2] for head in heads] == ["", "A:", "B:", "B "]
+    durations = page.locator("#compare-figures tbody tr").first.locator("td").all_inner_texts()
+    assert float(durations[0].split()[0]) < float(durations[1].split()[0])
+
+
+_UNNAMED = """() => [...document.querySelectorAll("button, input, select, textarea, canvas, [role=tab], [role=switch]")]
+    .filter((it) => it.checkVisibility() && !(it.ariaLabel || it.textContent.trim() || it.labels?.length || it.title))
+    .map((it) => it.outerHTML.slice(0, 120))"""
+
+
+@pytest.mark.parametrize(("width", "height"), [(1024, 768), (390, 844), (1280, 800)])
+def test_small_screens_and_names(opened: Opened, width: int, height: int) -> None:
+    """On every screen nothing sticks out to the side, and every control has a name for screen readers."""
+    page = opened.page
+    page.set_viewport_size({"width": width, "height": height})
+    for panel in ("Move", "Teach", "Cell", "Run"):
+        page.get_by_role("tab", name=panel).click()
+        page.wait_for_timeout(50)
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), panel
+        assert page.evaluate(_UNNAMED) == [], panel
+
+
+def test_by_keyboard_alone(opened: Opened) -> None:
+    """A frame is jogged to, taught, put into a program and driven to without a pointer."""
+    page = opened.page
+
+    def tab_to(name: str) -> None:
+        for _ in range(120):
+            page.keyboard.press("Tab")
+            focused = (
+                "document.activeElement.ariaLabel || document.activeElement.textContent || document.activeElement.id"
+            )
+            if page.evaluate(focused) == name:
+                return
+        raise AssertionError(f"Tab does not come to {name}")
+
+    before = opened.tool
+    tab_to("Joint 1 up")
+    page.keyboard.down("Enter")
+    opened.until(lambda: np.linalg.norm(opened.tool - before) > 1e-2)
+    page.keyboard.up("Enter")
+    page.get_by_role("tab", name="Move").focus()
+    page.keyboard.press("ArrowRight")
+    tab_to("teach-name")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("corner")
+    tab_to("Teach and insert")
+    page.keyboard.press("Enter")
+    opened.until(lambda: "CORNER" in opened.state()["frames"])
+    assert "TO CORNER" in page.locator("#text").input_value()
+    page.keyboard.press("F5")
+    opened.until(lambda: opened.state()["run"] is not None)
+    page.keyboard.press("Shift+F5")
+    opened.until(lambda: opened.state()["run"] is None)

@@ -256,12 +256,14 @@ class Run:
         only: whether only that statement is run.
         physics: whether in a world with physics.
         entry: whether it stands in front of the first statement.
+        rate: how fast it is shown, 1 being real time.
     """
 
     line: int = 0
     only: bool = False
     physics: bool = False
     entry: bool = False
+    rate: float = 1.0
 
 
 @attrs.frozen(kw_only=True)

@@ -245,6 +245,8 @@ class ProgramRun:
     def lines(self) -> list[dict[str, Any]]:
         """Return in which line each process is, as plain data: its name, the arm that it moves, the line."""
         machine = self.debugger.machine
+        if self.stop is not None and self.stop.reason == "end":
+            return []
         if self.stop is not None:
             stands = [(process, self.debugger.stack(process.path)[0]) for process in self.debugger.processes]
             return [

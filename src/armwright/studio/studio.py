@@ -193,7 +193,9 @@ class Studio:
             case m.Break():
                 project.set_breakpoint(command.line, on=command.on)
             case m.Run():
+                rate = _checked_rate(command.rate)
                 project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
+                project.running().rate = rate
             case m.Go():
                 project.running().go(command.way)
             case m.Pause():
@@ -203,10 +205,7 @@ class Studio:
             case m.KeepMotion():
                 project.keep_motion()
             case m.Pace():
-                least, most = _RATES
-                if not least <= command.rate <= most:
-                    raise MessageError(f"pace.rate: expected {least} to {most}, got {command.rate:g}")
-                project.running().rate = command.rate
+                project.running().rate = _checked_rate(command.rate)
 
     @property
     def moves(self) -> bool:
@@ -284,6 +283,13 @@ class Studio:
                 lambda: _picture_state(pictures[-1]) if pictures else None,
             ),
         }
+
+
+def _checked_rate(rate: float) -> float:
+    least, most = _RATES
+    if not least <= rate <= most:
+        raise MessageError(f"rate: expected {least} to {most}, got {rate:g}")
+    return rate
 
 
 def _picture_message(camera: str, content: bytes) -> dict[str, Any]:

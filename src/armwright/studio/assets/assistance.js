@@ -122,7 +122,8 @@ function onEditorKey(event) {
 }
 
 function describe(offset, [x, y]) {
-  if (editor.timer || !mine()) return;
+  if (!mine()) return;
+  if (editor.timer) sendText();
   helping.tip = [x, y];
   send({ do: "describe", offset: countOf(byId("text").value, offset) }, "describe");
 }

@@ -146,13 +146,14 @@ function startEditor() {
     clearTimeout(editor.timer);
     editor.timer = setTimeout(sendText, TYPED);
   });
+  // Tab leads on to the next control, as elsewhere: a line begins below the one before.
   field.addEventListener("keydown", (event) => {
-    if (event.key === "Tab" && !event.shiftKey && !field.readOnly) {
-      event.preventDefault();
-      field.setRangeText("  ", field.selectionStart, field.selectionEnd, "end");
-      field.dispatchEvent(new Event("input"));
-    }
-    if (event.key === "Escape") byId("run").focus();
+    if (event.key !== "Enter" || event.ctrlKey || event.altKey || field.readOnly) return;
+    const line = field.value.slice(0, field.selectionStart).split("\n").at(-1);
+    const [indent] = /^ */.exec(line);
+    if (!indent) return;
+    event.preventDefault();
+    document.execCommand("insertText", false, `\n${indent}`);
   });
   const follow = () => {
     byId("colours").scrollTop = byId("gutter").scrollTop = field.scrollTop;

@@ -2,7 +2,7 @@
 
 function runMessage(extra = {}) {
   if (editor.timer) sendText();
-  return { do: "run", physics: byId("physics").checked, ...extra };
+  return { do: "run", physics: byId("physics").checked, rate: Number(byId("pace").value), ...extra };
 }
 
 function startRun() {
@@ -41,7 +41,7 @@ function showTrace(trace) {
   list.replaceChildren(
     ...trace.map(({ t, line, text }) => make("li", {}, make("time", { textContent: `${number(t, 2)} s` }), make("span", { className: "quiet", textContent: `line ${line}` }), make("span", { textContent: text }))),
   );
-  list.lastChild?.scrollIntoView({ block: "nearest" });
+  list.scrollTop = list.scrollHeight;
 }
 
 function saveBlob(blob, name) {
