@@ -149,7 +149,7 @@ def test_teach_and_save(opened: Opened) -> None:
     page.get_by_role("tab", name="Teach").click()
     page.get_by_label("Name").fill("pick")
     page.get_by_role("button", name="Teach and insert").click()
-    opened.until(lambda: "PICK" in opened.state()["frames"])
+    opened.until(lambda: "PICK" in opened.state()["around"]["frames"])
 
     assert "+PICK" in page.locator("#change").inner_text()
     assert "MOVE ARM_1 TO PICK" in page.locator("#text").input_value()
@@ -320,7 +320,7 @@ def test_by_keyboard_alone(opened: Opened) -> None:
     page.keyboard.type("corner")
     tab_to("Teach and insert")
     page.keyboard.press("Enter")
-    opened.until(lambda: "CORNER" in opened.state()["frames"])
+    opened.until(lambda: "CORNER" in opened.state()["around"]["frames"])
     assert "TO CORNER" in page.locator("#text").input_value()
     page.keyboard.press("F5")
     opened.until(lambda: opened.state()["run"] is not None)

@@ -34,6 +34,7 @@ class Pages:
         self.studio = Studio(Project(Workbench(self.file.cell), self.file, folder / "bench.rlo"))
         self.studio.workbench.warm_up()
         self.now = 0.0
+        self.kept: dict[int, dict[str, Any]] = {}
         self.studio.page_opened(1)
 
     def send(self, word: str, page: int = 1, **fields: Any) -> str:
@@ -42,8 +43,11 @@ class Pages:
         return self.studio._refusals.get(page, "")
 
     def state(self, page: int = 1) -> dict[str, Any]:
-        """Return what a page shows."""
-        return json.loads(json.dumps(self.studio.state(page), allow_nan=False))  # type: ignore[no-any-return]
+        """Return what a page shows, with what it has from before."""
+        new = json.loads(json.dumps(self.studio.state(page), allow_nan=False))
+        kept = self.kept.setdefault(page, {})
+        kept |= {name: new[name] for name in ("around", "file", "program") if name in new}
+        return {**kept, **new}
 
     def wait(self, seconds: float) -> None:
         """Let time go by [s]."""
@@ -266,7 +270,7 @@ def test_joint_targets(pages: Pages) -> None:
     assert pages.send("go to", arm="ARM_1", name="HOME") == ""
     np.testing.assert_allclose(pages.studio.workbench.arms["ARM_1"].q, q, atol=1e-6)
     assert pages.send("forget", name="HOME") == ""
-    assert pages.state()["targets"] == {}
+    assert pages.state()["around"]["targets"] == {}
 
 
 def test_a_program_from_nothing(tmp_path: Path) -> None:

@@ -141,6 +141,8 @@ class CellFile:
 
     def difference(self) -> str:
         """Return what saving would change in the file, as a unified diff; empty where it is nothing."""
+        if self.text == self._saved:
+            return ""
         before, after = (text.splitlines(keepends=True) for text in (self._saved, self.text))
         return "".join(difflib.unified_diff(before, after, self.path.name, f"{self.path.name}, taught"))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -96,6 +96,8 @@ class LiveArm:
         self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
         self._near = np.where(revolute, _NEAR_ANGLE, _NEAR_LENGTH)
         self._geometry = find_geometry(placed.arm)
+        # A pose, and the configurations that bring the tool there.
+        self._latest: tuple[Array, Array] = np.empty((0, 0)), np.empty((0, 0))
 
     @cached_property
     def equations(self) -> CompiledArm | None:
@@ -144,28 +146,26 @@ class LiveArm:
             return [Solution(self.q, "numeric", "", here=True)]
         rows = self._branches(self.tool)
         here = int(np.abs(rows - self.q).max(axis=1).argmin()) if len(rows) else -1
+        labels = _labels(self._geometry, rows)
         return [
-            Solution(
-                q,
-                _label(self._geometry, q),
-                "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))),
-                here=i == here,
-            )
+            Solution(q, labels[i], "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))), here=i == here)
             for i, q in enumerate(rows)
         ]
 
     def _branches(self, X_WT: Array) -> Array:
         """Return the configurations (k, n) that bring the tool to a pose."""
         assert self.equations is not None  # noqa: S101 - asked for only then
+        # A tool that is dragged is asked about twice: where it can be, and where it is.
+        if np.array_equal(X_WT, self._latest[0]):
+            return self._latest[1]
         X_BT = inverse(self.placed.base) @ X_WT
         q, _ = self.equations.inverse_branches(X_BT, self.q)
-        rows: list[Array] = []
-        for number in np.flatnonzero(self._is_met(self.equations.forward(q), X_BT)).tolist():
-            row = self.turned(q[number])
-            # A branch that a pose does not have repeats another.
-            if not any(np.abs(row - other).max() < _MET for other in rows):
-                rows.append(row)
-        return np.array(rows).reshape(-1, self.placed.arm.n)
+        q = self.turned(q[self._is_met(self.equations.forward(q), X_BT)])
+        # A branch that a pose does not have repeats another.
+        same = np.abs(q[:, None] - q).max(axis=2, initial=0.0) < _MET
+        rows: Array = q[~np.tril(same, -1).any(axis=1)]
+        self._latest = np.array(X_WT), rows
+        return rows
 
     def turned(self, q: Array) -> Array:
         """Return configurations (..., n) with every angle turned by a revolution into its limits, where possible."""
@@ -276,20 +276,17 @@ class LiveArm:
         return Remark("singular", "error" if near == "at" else "warning", text, joints)
 
 
-def _label(geometry: ClosedFormGeometry, q: Array) -> str:
-    """Return the name of the branch that a configuration (n,) is in.
+def _labels(geometry: ClosedFormGeometry, q: Array) -> list[str]:
+    """Return the names of the branches that configurations (k, n) are in.
 
     Branches meet where a factor of the determinant of the Jacobian vanishes: its signs tell them apart.
     """
-    angles = geometry.angles(q.tolist())
-    side, second, flip = determinant_factors(geometry, angles)
+    angles = geometry.angles(list(q.T))
+    side, second, flip = (np.where(factor >= 0, 1, -1).tolist() for factor in determinant_factors(geometry, angles))
     # The factor of an elbow falls where its angle grows.
-    second = second if geometry.family == "stanford" else -second
-    return label(geometry, (_sign(side), _sign(second), _sign(flip)), np.array(angles))
-
-
-def _sign(value: Any) -> Literal[1, -1]:
-    return 1 if value >= 0 else -1
+    way = 1 if geometry.family == "stanford" else -1
+    rows = np.array(angles).T.tolist()
+    return [label(geometry, (side[i], way * second[i], flip[i]), row) for i, row in enumerate(rows)]
 
 
 def _direction_text(twist: Array) -> str:

@@ -440,6 +440,9 @@ _COMMANDS: dict[str, type[Any]] = {
 }
 
 
+_HINTS = {word: typing.get_type_hints(kind) for word, kind in _COMMANDS.items()}
+
+
 def read_message(text: str | bytes) -> Command:
     """Return the command of a message.
 
@@ -463,7 +466,7 @@ def read_message(text: str | bytes) -> Command:
 
 
 def _made(kind: type[Any], word: str, content: dict[str, Any]) -> Command:
-    hints = typing.get_type_hints(kind)
+    hints = _HINTS[word]
     known = {field.name: field.default for field in attrs.fields(kind)}
     for name in content:
         if name not in known:

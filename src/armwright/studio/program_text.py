@@ -80,9 +80,11 @@ class ProgramText:
         text: as it is now.
         version: counts its changes.
         compiled: what became of it.
+        compilations: counts how often it has been compiled.
     """
 
     compiled: Compilation
+    compilations = 0
 
     def __init__(self, path: Path | None, text: str, cell: Cell) -> None:
         """Take a text."""
@@ -119,6 +121,7 @@ class ProgramText:
 
     def _compile(self) -> None:
         self.compiled = self._compiled(self.text)
+        self.compilations += 1
         self._diagnostics = [self._diagnostic_state(it) for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]]
 
     def _compiled(self, text: str) -> Compilation:

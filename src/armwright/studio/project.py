@@ -255,15 +255,13 @@ class Project:
         self.workbench.follow(self.run)
         return True
 
+    def file_state(self) -> dict[str, Any] | None:
+        """Return what a page shows of the cell file, as plain data; None where there is none."""
+        if self.file is None:
+            return None
+        frames = list(self.file.cell.frames)
+        return {"name": self.file.path.name, "change": self.file.difference(), "frames": frames}
+
     def state(self) -> dict[str, Any]:
-        """Return what a page shows of it beside the text of the program, as plain data."""
-        taught = None
-        if self.file is not None:
-            frames = list(self.file.cell.frames)
-            taught = {"name": self.file.path.name, "change": self.file.difference(), "frames": frames}
-        return {
-            "program": {**self.program.state(), "breakpoints": sorted(self.breakpoints)},
-            "run": None if self.run is None else self.run.state(),
-            "file": taught,
-            "devices": self._device_states(),
-        }
+        """Return what a page shows of it beside its files, as plain data."""
+        return {"run": None if self.run is None else self.run.state(), "devices": self._device_states()}

@@ -245,7 +245,7 @@ class Studio:
             self._refusals[page] = str(error)
 
     def state(self, page: int) -> dict[str, Any]:
-        """Return what a page shows, as plain data; with the text of the program where it has another one."""
+        """Return what a page shows, as plain data, without what it has already of what changes seldom."""
         state = {
             **self.workbench.state(),
             **self.project.state(),
@@ -264,8 +264,16 @@ class Studio:
         project, bench, run = self.project, self.workbench, self.project.run
         arms = bench.arms
         pictures = () if run is None else run.pictures()
+        program, file = project.program, project.file
+        breakpoints = sorted(project.breakpoints)
         return {
-            "source": (project.program.version, lambda: project.program.text),
+            "around": (bench.around_key, bench.around_state),
+            "file": (None if file is None else (file.text, file.changed), project.file_state),
+            "program": (
+                (program.compilations, program.changed, tuple(breakpoints)),
+                lambda: {**program.state(), "breakpoints": breakpoints},
+            ),
+            "source": (program.version, lambda: program.text),
             "map": (
                 (bench.map_number, bench.map is not None and bench.map.done),
                 lambda: None if bench.map is None else bench.map.state(),

@@ -58,6 +58,9 @@ class Workbench:
         self._ghost: tuple[str, Array] | None = None
         # What was shown last of a run: parts and openings.
         self._followed: object = None
+        # Counts the changes of parts and frames that no motion of an arm makes, and whether arms move frames.
+        self._changes = 0
+        self._frames_move = (-1, False)
         self._undo: list[tuple[str, Array]] = []
         self._gesture = ("", -math.inf)
 
@@ -190,6 +193,7 @@ class Workbench:
         hands = {each: arm.tool for each, arm in self.arms.items()}
         (self._parts.open if open_it else self._parts.close)(name, hands, now)
         self._checks = None
+        self._changes += 1
 
     def _changing(self, arm: LiveArm, gesture: str, now: float) -> None:
         """Keep where an arm is, to return to it, unless it is still moved by the same gesture."""
@@ -210,12 +214,16 @@ class Workbench:
         for name, arm in self.arms.items():
             measured = run.measured(name)
             arm.q = run.motion(name)[0] if measured is None else np.array(measured.q)
-        self._tree, self._spelled, parts = run.tree(), run.spelled, run.parts()
+        tree, parts = run.tree(), run.parts()
+        if tree is not self._tree:
+            self._tree, self._spelled = tree, run.spelled
+            self._changes += 1
         widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
         openings = {name: run.opening(name) * width for name, width in widths.items()}
         key = tuple((carrier, X.tobytes()) for carrier, X in parts.values()), tuple(openings.values())
         if key != self._followed:
             self._followed, self._checks = key, None
+            self._changes += 1
             self._parts = PartPoses.arranged(self.cell, parts, openings)
 
     def reset(self) -> None:
@@ -224,6 +232,7 @@ class Workbench:
             arm.q = np.array(arm.placed.start)
         self._parts, self._tree, self._spelled = PartPoses(self.cell), self.cell.tree(), str
         self._checks = self._followed = None
+        self._changes += 1
 
     def configurations(self) -> dict[str, Array]:
         """Return the joint positions (n,) of the arms."""
@@ -244,6 +253,7 @@ class Workbench:
     def take_frames(self, cell: Cell) -> None:
         """Take the frames and joint targets of a cell that differs in nothing else."""
         self.cell, self._tree, self._spelled = cell, cell.tree(), str
+        self._changes += 1
 
     # ---- maps and previews ---------------------------------------------------------------------------------------
 
@@ -285,16 +295,30 @@ class Workbench:
         return self._checks.nearest(self.configurations(), _NEAR)
 
     def state(self) -> dict[str, Any]:
-        """Return what a page shows, as plain data."""
+        """Return what a page shows that changes with the arms, as plain data."""
         return {
             "ready": self.ready,
             "arms": {name: self._arm_state(arm) for name, arm in self.arms.items()},
-            "parts": {name: self._part_state(name) for name in self.cell.parts},
-            "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},
-            "targets": {name: {"arm": it.arm, "q": _rounded(it.q)} for name, it in self.cell.joint_targets.items()},
             "near": self._near_state(),
             "ghost": None if self._ghost is None else {"arm": self._ghost[0], "q": _rounded(self._ghost[1])},
             "undo": len(self._undo),
+        }
+
+    @property
+    def around_key(self) -> object:
+        """What is around the arms is the same where this is."""
+        if self._frames_move[0] != self._changes:
+            moving = any(not self.arms.keys().isdisjoint(self._tree.ancestors(name)) for name in self._tree)
+            self._frames_move = self._changes, moving
+        arms = tuple(arm.q.tobytes() for arm in self.arms.values()) if self._frames_move[1] else ()
+        return self._changes, arms
+
+    def around_state(self) -> dict[str, Any]:
+        """Return what a page shows of what is around the arms, as plain data: parts, frames and joint targets."""
+        return {
+            "parts": {name: self._part_state(name) for name in self.cell.parts},
+            "frames": {name: _rounded(to_noap(X)) for name, X in self.frame_poses().items()},
+            "targets": {name: {"arm": it.arm, "q": _rounded(it.q)} for name, it in self.cell.joint_targets.items()},
         }
 
     def _arm_state(self, arm: LiveArm) -> dict[str, Any]:

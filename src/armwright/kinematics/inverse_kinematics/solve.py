@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -85,7 +86,7 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
     return numeric_inverse(arm, X, reference) if geometry is None else _closed(arm, geometry, X, reference)
 
 
-def label(geometry: ClosedFormGeometry, signs: Signs, angles: Array) -> str:
+def label(geometry: ClosedFormGeometry, signs: Signs, angles: Array | Sequence[float]) -> str:
     """Name a branch: arm, elbow or slide, wrist.
 
     The elbow is up where it is above the line from joint 2 to the end of the forearm, above as the axis of joint 1

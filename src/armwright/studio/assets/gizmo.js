@@ -16,7 +16,7 @@ function gizmoAxes(X) {
   if (frame === "TOOL" || frame === "") return columns(X);
   if (frame === "WORLD") return [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   if (frame === "BASE") return columns(data.animation.arms[chosenArm().name].base);
-  const pose = live.state.frames[frame];
+  const pose = live.state.around.frames[frame];
   return pose ? columns(pose) : columns(X);
 }
 

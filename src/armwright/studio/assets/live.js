@@ -3,6 +3,7 @@
 const RETRY = 500; // [ms]
 const live = { socket: null, awaiting: false, queue: new Map(), state: null, taken: 0, lost: false };
 const followers = [];
+const SELDOM = ["around", "file", "program"];
 // What takes a message that is no state, by the only key of that.
 const answers = {};
 
@@ -44,6 +45,8 @@ function receive(text) {
     return;
   }
   const first = !live.state;
+  // What changes seldom is kept from before.
+  for (const key of SELDOM) message[key] ??= live.state?.[key] ?? null;
   live.state = message;
   live.awaiting = false;
   if (!flush()) live.socket.send('{"do":"got"}');

@@ -26,10 +26,10 @@ function applyState(state) {
     figure.grip = [arm.grip];
   }
   for (const part of data.animation.parts) {
-    const { arm, pose } = state.parts[part.name];
+    const { arm, pose } = state.around.parts[part.name];
     Object.assign(part, { arms: [arm], poses: [pose] });
   }
-  for (const frame of data.animation.frames) if (state.frames[frame.name]) frame.poses = [state.frames[frame.name]];
+  for (const frame of data.animation.frames) if (state.around.frames[frame.name]) frame.poses = [state.around.frames[frame.name]];
 }
 
 function warningItem({ level, text }) {

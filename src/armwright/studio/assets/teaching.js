@@ -4,7 +4,7 @@ const editorLine = () => byId("text").value.slice(0, byId("text").selectionStart
 
 // Of what is taught, a frame or a joint target, with what can be done with it.
 function taughtItem(name, isTarget) {
-  const arm = () => (isTarget ? live.state.targets[name].arm : chosenArm().name);
+  const arm = () => (isTarget ? live.state.around.targets[name].arm : chosenArm().name);
   const go = make("button", { type: "button", textContent: "Go", title: isTarget ? `Bring the joints to ${name}` : `Bring the tool to ${name}` });
   go.addEventListener("click", () => send({ do: "go to", arm: arm(), name }));
   whilePointedAt(
@@ -36,7 +36,7 @@ function taughtItem(name, isTarget) {
 function showTeaching(state) {
   const file = state.file;
   byId("file-name").textContent = file ? `into ${file.name}` : "there is no cell file: begin one with --new";
-  const [frames, targets] = [Object.keys(state.frames), Object.keys(state.targets)];
+  const [frames, targets] = [Object.keys(state.around.frames), Object.keys(state.around.targets)];
   const names = [...frames, ...targets];
   const list = byId("frames");
   const key = JSON.stringify([frames, targets, file?.frames]);
@@ -53,8 +53,8 @@ function showTeaching(state) {
     followFrames(frames);
   }
   names.forEach((name, i) => {
-    const target = state.targets[name];
-    list.children[i].children[1].textContent = target ? `joints${data.arms.length > 1 ? ` of ${target.arm}` : ""}` : `${placeText(state.frames[name].slice(9))} mm`;
+    const target = state.around.targets[name];
+    list.children[i].children[1].textContent = target ? `joints${data.arms.length > 1 ? ` of ${target.arm}` : ""}` : `${placeText(state.around.frames[name].slice(9))} mm`;
   });
   byId("change-card").hidden = !file?.change;
   if (byId("change").textContent !== (file?.change ?? "")) showChange(file?.change ?? "");
@@ -75,7 +75,7 @@ function freeName(names) {
 
 // The view draws the frames that there are now.
 function followFrames(names) {
-  data.animation.frames = names.map((name) => ({ name, visible_from: 0, poses: [live.state.frames[name]] }));
+  data.animation.frames = names.map((name) => ({ name, visible_from: 0, poses: [live.state.around.frames[name]] }));
   fillFrames();
 }
 
@@ -103,7 +103,7 @@ function startTeaching() {
   choose();
   byId("insert").addEventListener("submit", (event) => {
     event.preventDefault();
-    const common = { arm: chosenArm().name, frame: name.value || freeName([...Object.keys(live.state.frames), ...Object.keys(live.state.targets)]), line: editorLine() };
+    const common = { arm: chosenArm().name, frame: name.value || freeName([...Object.keys(live.state.around.frames), ...Object.keys(live.state.around.targets)]), line: editorLine() };
     if (form.value === "via") send({ do: "via", ...common, blend: value("insert-blend", MILLIMETRES) });
     else
       send({
