@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 CONSTRAINTS ?= constraints.txt
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(abspath $(CONSTRAINTS)))
 
-.PHONY: help demo test proof bench edges examples docs site gallery studies pictures messages editor fuzz versions sbom clean
+.PHONY: help demo test proof bench jupyter edges examples docs site gallery studies pictures messages editor fuzz versions sbom clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -99,6 +99,11 @@ messages: $(VENV)/core  ## Write the page of all messages
 
 bench: $(VENV)/bench  ## Measure against the peers, one core each
 	PYTHONPATH=tests $(BIN)/python benchmarks/run.py
+
+jupyter: $(VENV)/test  ## Test the widget in JupyterLab, in a virtual environment of its own
+	test -x out/jupyter/bin/python || $(PYTHON) -m venv out/jupyter
+	out/jupyter/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test,urdf,studio,notebook]' jupyterlab
+	out/jupyter/bin/python -m pytest tests/studio/test_jupyter.py
 
 edges: $(VENV)/bench  ## Measure inverse kinematics at its edges, beside the peers (6 minutes)
 	PYTHONPATH=tests $(BIN)/python benchmarks/inverse_edges.py

@@ -47,7 +47,7 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         token: with which it connects to its server.
         policy: what the page may do, as of Content-Security-Policy.
     """
-    script = "\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)])
+    script = _without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)]))
     return Template(_asset("studio.html")).substitute(
         title=html.escape(f"{workbench.cell.name} - armwright studio"),
         name=html.escape(workbench.cell.name),
@@ -60,6 +60,12 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
 
 def _asset(name: str) -> str:
     return (files("armwright.studio") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _without_comments(script: str) -> str:
+    """Return a script without lines of comments and blanks before lines, a seventh of it."""
+    lines = map(str.strip, script.splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _shown_first(workbench: Workbench) -> dict[str, Any]:

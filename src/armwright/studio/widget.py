@@ -15,9 +15,12 @@ from armwright.cell.model import Cell, CellArm
 from armwright.errors import KindError, shown
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range
+from armwright.motion.moves import Move
+from armwright.motion.trajectory import Trajectory
 from armwright.program.vm.recording import Recording
 from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
+from armwright.studio.motion_page import along_trajectory, motion_page
 from armwright.studio.page import studio_page
 from armwright.studio.project import Project
 from armwright.studio.studio import Studio
@@ -52,7 +55,7 @@ export default {
 """
 
 
-class Shown:
+class PageFrame:
     """A page that a notebook shows as it is."""
 
     def __init__(self, page: str) -> None:
@@ -66,25 +69,36 @@ class Shown:
         return f'<iframe sandbox="allow-scripts" style="{style}" srcdoc="{content}"></iframe>'
 
 
-def show(thing: Arm | Cell | Recording, *, q: ArrayLike | None = None) -> Any:
-    """Return what a notebook shows of a thing: arms and cells to be moved by hand, recordings as the page of a run.
+def show(
+    thing: Arm | Cell | Recording | Move | Trajectory, *, q: ArrayLike | None = None, arm: Arm | None = None
+) -> Any:
+    """Return what a notebook shows of a thing.
+
+    Arms and cells are moved by hand; recordings, moves and trajectories are played.
 
     Args:
-        thing: an arm, a cell or the recording of a run.
+        thing: an arm, a cell, the recording of a run, a move, or a trajectory of joints.
         q: (n,) joint positions of an arm; the middle of its limits when left out.
+        arm: whose joints a trajectory is of.
 
     Raises:
-        KindError: it is something else.
+        KindError: it is something else, or a trajectory of no arm.
         MissingExtraError: anywidget is not installed.
     """
     if isinstance(thing, Recording):
-        return Shown(run_page(run_page_data(thing, (), "")))
+        return PageFrame(run_page(run_page_data(thing, (), "")))
+    if isinstance(thing, Move):
+        return PageFrame(run_page(motion_page(thing)))
+    if isinstance(thing, Trajectory):
+        if arm is None:
+            raise KindError("a trajectory is shown of an arm: show(trajectory, arm=arm)")
+        return PageFrame(run_page(motion_page(along_trajectory(arm, thing))))
     if isinstance(thing, Arm):
         start = mid_range(thing) if q is None else joint_array(q, thing.n)
         return live_widget(Cell(name=thing.name, arms={"ARM_1": CellArm(arm=thing, start=start)}))
     if isinstance(thing, Cell):
         return live_widget(thing)
-    raise KindError(f"expected an arm, a cell or a recording, got {shown(thing)}")
+    raise KindError(f"expected an arm, a cell, a recording, a move or a trajectory, got {shown(thing)}")
 
 
 def live_widget(cell: Cell) -> Any:
