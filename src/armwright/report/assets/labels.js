@@ -4,6 +4,7 @@ let labels = [];
 let labelBoxes = [];
 const LABEL_FONT = "12px system-ui, sans-serif";
 const LABEL_HEIGHT = 15;
+const FAINT = 0.5;
 // Where a name may stand about its point: to the right, to the left, below, above, then farther away.
 const LABEL_PLACES = [0, 1, 2, 3].flatMap((far) => [
   [1, -1 - far],
@@ -20,6 +21,7 @@ function joinedLabels() {
       (other) =>
         other.below === label.below &&
         other.quiet === label.quiet &&
+        other.hidden === label.hidden &&
         Math.hypot(other.p.x - label.p.x, other.p.y - label.p.y) < 9,
     );
     if (near) near.text += `, ${label.text}`;
@@ -45,7 +47,7 @@ function boxesOf({ p, below }, wide) {
 const overlap = (a, b) =>
   a.x < b.x + b.wide + 3 && b.x < a.x + a.wide + 3 && a.y < b.y + LABEL_HEIGHT && b.y < a.y + LABEL_HEIGHT;
 
-// A name for which there is no room is left out; the list of frames has it.
+// A name for which there is no room is left out; the list of frames has it. Names of what is hidden are faint.
 function paintLabels() {
   pen.font = LABEL_FONT;
   pen.textBaseline = "middle";
@@ -54,20 +56,25 @@ function paintLabels() {
   const taken = [{ x: 10, y: canvas.clientHeight - 18, wide: pen.measureText(scale).width }];
   pen.fillStyle = colours.quiet;
   pen.fillText(scale, taken[0].x, taken[0].y + 8);
-  for (const label of joinedLabels()) {
+  for (const label of labels) label.hidden = isHidden(label.p);
+  // What is in sight has the first choice of places.
+  for (const label of joinedLabels().sort((a, b) => a.hidden - b.hidden)) {
     const box = boxesOf(label, pen.measureText(label.text).width).find(
       (one) => !taken.some((other) => overlap(one, other)),
     );
     if (!box) continue;
     taken.push(box);
     const [x, y] = [box.x, box.y + LABEL_HEIGHT / 2];
+    const alpha = label.hidden ? FAINT : 1;
     if (box.far)
-      stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7);
+      stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7 * alpha);
+    pen.globalAlpha = alpha;
     pen.lineWidth = 3.5;
     pen.strokeStyle = colours.sky;
     pen.strokeText(label.text, x, y);
     pen.fillStyle = label.quiet ? colours.quiet : colours.ink;
     pen.fillText(label.text, x, y);
+    pen.globalAlpha = 1;
   }
   pen.textBaseline = "alphabetic";
   labelBoxes = taken;
