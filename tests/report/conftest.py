@@ -15,7 +15,9 @@ from armwright.report.page import ArmRecord, Effect, JointInfo, Message, RunPage
 
 FPS = 25.0
 SHOULDER, UPPER, FORE, HAND = 0.42, 0.43, 0.40, 0.14
-SLOWED = StageBadge(text="speed j2 ×1.20", title="1.20 times slower, limited by the speed of joint 2", mark="warn")
+SLOWED = StageBadge(
+    text="speed j2", title="1.20 times slower, limited by the speed of joint 2", mark="warn", factor=1.2
+)
 PROGRAM = """\
 { Carry a part from the feeder to the fixture;
   the second arm looks on and then makes room. }

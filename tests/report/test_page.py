@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.report.page import ArmRecord, JointInfo, RunPage
+from armwright.report.page import ArmRecord, JointInfo, RunPage, StageBadge
 
 pytestmark = [pytest.mark.browser, pytest.mark.early]
 
@@ -245,7 +245,7 @@ def test_tree_follows(visit, bench) -> None:
 
 
 def test_camera(visit, bench) -> None:
-    """Dragging, the wheel and the buttons change the view; Reset brings the first one back."""
+    """Dragging, the wheel with Ctrl and the buttons change the view; Reset brings the first one back."""
     opened = visit(bench)
     pictures = [opened.pixels()]
     box = opened.page.locator("#view").bounding_box()
@@ -256,7 +256,9 @@ def test_camera(visit, bench) -> None:
     opened.page.mouse.up()
     pictures.append(opened.pixels())
     opened.page.evaluate("window.before = document.getElementById('view').toDataURL()")
+    opened.page.keyboard.down("Control")
     opened.page.mouse.wheel(0, -300)
+    opened.page.keyboard.up("Control")
     opened.until("document.getElementById('view').toDataURL() !== window.before")
     pictures.append(opened.pixels())
     for name in ("top", "front", "side"):
@@ -303,6 +305,7 @@ def test_nothing_moved(visit, bench) -> None:
         "arm": None,
         "q": [],
         "hand": None,
+        "jog": False,
         "line": None,
         "stage": -1,
     }
@@ -353,7 +356,7 @@ def test_names_are_text(visit, bench) -> None:
         status=nasty,
         cell_name=nasty,
         effects=tuple(attrs.evolve(effect, text=nasty) for effect in bench.effects),
-        stages=tuple(attrs.evolve(stage, to=(nasty,), note=nasty) for stage in bench.stages),
+        stages=tuple(attrs.evolve(stage, to=(nasty,), badges=(StageBadge(text=nasty, title=nasty),)) for stage in bench.stages),
         animation=attrs.evolve(bench.animation, frames=frames),
     )
     opened = visit(run)

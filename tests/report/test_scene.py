@@ -437,11 +437,11 @@ def test_errors_of_a_cell_with_physics(visit, stocked: Recording) -> None:
 
 @pytest.mark.browser
 def test_long_lists_on_paper(visit, stocked: Recording) -> None:
-    """On paper the list of what happened is as long as it must be, and the table of stages is below it."""
+    """On paper the list of what happened is as long as it must be, and the frames are below it."""
     page = visit(page_of(stocked), viewport={"width": 700, "height": 900}).page
     page.emulate_media(media="print")
     rows = "[...document.querySelectorAll('#trace button')].map((row) => row.getBoundingClientRect().bottom)"
-    below = "document.querySelector('#stages-card').getBoundingClientRect().top"
+    below = "document.querySelector('#tree-card').getBoundingClientRect().top"
 
     assert len(page.evaluate(rows)) > 5
     assert max(page.evaluate(rows)) <= page.evaluate(below)
@@ -519,14 +519,14 @@ def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
         opened.seek(t)
         assert drawn("BLOCK")[0][10] == pytest.approx(y, abs=1e-3)
     joints = opened.page.locator("#readout")
-    assert joints.locator("h3").inner_text() == f"Joints of {stream.arm}, measured"
+    assert joints.locator("h2").inner_text() == f"Joints of {stream.arm}, measured"
     assert "mm open" in joints.inner_text()
     before = opened.pixels()
-    opened.page.click("#planned")
+    opened.page.click("[data-layer=planned]")
     assert opened.pixels() != before
-    opened.page.click("#planned")
+    opened.page.click("[data-layer=planned]")
     assert opened.pixels() == before
-    assert not visit(page_of(stocked)).page.locator("#planned").is_visible()
+    assert not visit(page_of(stocked)).page.locator("[data-layer=planned]").is_visible()
     assert opened.complaints == []
 
 

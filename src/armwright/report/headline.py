@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 _SHORT = {"position": "pos", "speed": "speed", "acceleration": "acc", "effort": "effort"}
 # Limits that are named; others are counted.
 _NAMED = 2
+# Rounding beyond a limit is none.
+_TOLERANCE = 1e-6
 
 
 @attrs.frozen
@@ -72,7 +74,7 @@ def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Figure]:
     if shares:
         share, stage, joint = max(shares, key=lambda one: one[0])
         label = f"peak effort, {_of(data, stage)}{joint}"
-        yield Figure(f"{share:.0%}".replace("%", " %"), label, _during(stage), "bad" if share > 1 + 1e-6 else "")
+        yield Figure(f"{share:.0%}".replace("%", " %"), label, _during(stage), "bad" if share > 1 + _TOLERANCE else "")
 
 
 def _tracking(data: RunPage) -> Iterator[Figure]:
@@ -115,16 +117,18 @@ def _distance(data: RunPage) -> Iterator[Figure]:
 def _limits(data: RunPage) -> Figure:
     """Return which limits joints reach, and of which joints."""
     several = len(data.arms) > 1
-    reached = {
-        (arm.name, span.limit, span.joint): f"{arm.name + ' ' if several else ''}{_SHORT[span.limit]} j{span.joint + 1}"
-        for arm in data.arms
-        for span in arm.at_limits
-    }
-    if not reached:
+    shares: dict[str, float] = {}
+    for arm in data.arms:
+        for span in arm.at_limits:
+            name = f"{arm.name + ' ' if several else ''}{_SHORT[span.limit]} j{span.joint + 1}"
+            shares[name] = max(span.share, shares.get(name, 0.0))
+    beyond = [name for name, share in shares.items() if share > 1 + _TOLERANCE]
+    names = beyond or list(shares)
+    if not names:
         return Figure("none", "limits reached")
-    names = list(reached.values())
     shown = ", ".join(names) if len(names) <= _NAMED else f"{len(names)}"
-    return Figure(shown, "limits reached", ", ".join(names), "warn")
+    title = ", ".join(f"{name} {shares[name]:.0%}" for name in names)
+    return Figure(shown, "limits exceeded" if beyond else "limits reached", title, "bad" if beyond else "warn")
 
 
 def _of(data: RunPage, stage: StageRow) -> str:

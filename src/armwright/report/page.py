@@ -99,14 +99,16 @@ class StageBadge:
     """A remark on a stage.
 
     Attributes:
-        text: in a few letters, such as ``acc j4 ×1.38``.
+        text: in a few letters, such as ``acc j4``.
         title: in a sentence.
         mark: ``good``, ``warn`` or ``bad``; empty where it is neither.
+        factor: how many times slower the stage is for it; None where it is not.
     """
 
     text: str
     title: str
     mark: Literal["", "good", "warn", "bad"] = ""
+    factor: float | None = None
 
 
 @attrs.frozen(kw_only=True)

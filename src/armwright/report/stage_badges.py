@@ -34,8 +34,8 @@ def stage_badges(run: RunStage) -> Iterator[StageBadge]:
         yield StageBadge(text="planned path", title=path_text(run.path))
     if certificate is not None and certificate.because is not None:
         limit, joint = certificate.because
-        text = f"{_SHORT[limit]} j{joint + 1} ×{certificate.factor:.2f}"
-        yield StageBadge(text=text, title=certificate.slowed, mark="warn")
+        text = f"{_SHORT[limit]} j{joint + 1}"
+        yield StageBadge(text=text, title=certificate.slowed, mark="warn", factor=certificate.factor)
     elif stage.slowed and not where:
         yield StageBadge(text="slowed", title=stage.slowed, mark="warn")
     if certificate is not None:

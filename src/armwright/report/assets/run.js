@@ -23,22 +23,22 @@ function messageItem(message) {
   return item;
 }
 
-// Messages that are shown at once; a button shows the others.
-const FIRST_MESSAGES = 3;
+// Messages that are shown at once; a button after them shows the others.
+const FIRST_MESSAGES = 2;
 
 function fillMessages() {
   const items = data.messages.map(messageItem);
   const rest = items.slice(FIRST_MESSAGES);
   byId("messages").append(...items);
-  if (rest.length < 2) return;
+  if (!rest.length) return;
   for (const item of rest) item.classList.add("folded");
   const more = make("button", { type: "button", textContent: `${rest.length} more` });
-  const line = make("li", { className: "more" }, more);
+  more.className = "more";
   more.addEventListener("click", () => {
     for (const item of rest) item.classList.remove("folded");
-    line.remove();
+    more.remove();
   });
-  byId("messages").append(line);
+  items[FIRST_MESSAGES - 1].append(more);
 }
 
 function presentRow(arm) {
@@ -96,6 +96,12 @@ function startDrawer() {
   });
 }
 
+// The view is as high as the first screen leaves room for.
+function fitStage() {
+  const top = canvas.getBoundingClientRect().top + window.scrollY;
+  document.body.style.setProperty("--room", `${window.innerHeight - top - byId("dock").offsetHeight - 28}px`);
+}
+
 function redraw() {
   readColours();
   drawView();
@@ -108,9 +114,11 @@ function start() {
   fillTrace();
   fillStages();
   fillPictures();
+  fitStage();
   byId("tree-card").hidden = !tree.changes.length;
   startView({ scrolls: true });
   startDrawer();
+  window.addEventListener("resize", fitStage);
   startJog();
   startJointCharts();
   listeners.push(showClock, showProgram, showStages, showPictures, showReadout, drawView);

@@ -54,13 +54,25 @@ function clearanceCell(stages) {
 }
 
 function badgesCell(stages) {
-  const badges = new Map(stages.flatMap((stage) => stage.badges).map((badge) => [badge.text, badge]));
+  // Of what differs only in its factor the largest counts.
+  const badges = new Map();
+  for (const badge of stages.flatMap((stage) => stage.badges))
+    if (!badges.has(badge.text) || badge.factor > badges.get(badge.text).factor) badges.set(badge.text, badge);
   const it = cell("", "", "badges");
   it.append(
-    ...[...badges.values()].map(({ text, title, mark }) =>
-      make("span", { className: `badge ${mark || "plain"}`, textContent: text, title }),
-    ),
+    ...[...badges.values()].map(({ text, factor, title, mark }) => {
+      const textContent = factor === null ? text : `${text} ×${number(factor, 2)}`;
+      return make("span", { className: `badge ${mark || "plain"}`, textContent, title });
+    }),
   );
+  return it;
+}
+
+// The goals of all stages of a row, or the first and the last.
+function goalCell(stages) {
+  const goals = [...new Set(stages.map(({ to }) => to.join(", ")))];
+  const it = cell(goals.length > 2 ? `${goals[0]} … ${goals.at(-1)}` : goals.join(", "), "", "head goal");
+  it.title = goals.join("\n");
   return it;
 }
 
@@ -97,7 +109,7 @@ function stageRow(numbers, more = null) {
     "tr",
     {},
     first,
-    cell(stage.to.join(", "), "", "head goal"),
+    goalCell(stages),
     cell(stage.arm, "", "arm"),
     numeric("line", stage.line, "extra"),
     numeric("start", number(stage.t0, 2), "extra"),
@@ -114,11 +126,19 @@ function stageRow(numbers, more = null) {
   return row;
 }
 
+// Which stage of its MOVE a stage is; its goals where the MOVE is not on the page.
+function placeInMove({ arm, line, t0, to }, i) {
+  const during = (effect) => effect.t0 <= t0 + HAIR && t0 + HAIR < effect.t1;
+  const move = data.effects.find((effect) => effect.arm === arm && effect.line === line && during(effect));
+  if (!move) return to;
+  return data.stages.slice(0, i).filter((one) => one.arm === arm && one.t0 >= move.t0 - HAIR).length;
+}
+
 // The same stage of the same MOVE, run again and again.
 function passes() {
   const groups = new Map();
-  data.stages.forEach(({ arm, line, kind, to, speed }, i) => {
-    const key = JSON.stringify([arm, line, kind, to, speed]);
+  data.stages.forEach((stage, i) => {
+    const key = JSON.stringify([stage.arm, stage.line, stage.kind, placeInMove(stage, i)]);
     groups.set(key, [...(groups.get(key) ?? []), i]);
   });
   return [...groups.values()];
@@ -183,6 +203,8 @@ function fillStages() {
   if (!(data.duration > 0)) return;
   byId("strip").classList.add("tracks");
   byId("strip").append(...data.arms.map(trackOf));
+  const longest = Math.max(...data.arms.map((arm) => arm.name.length));
+  byId("strip").parentElement.style.setProperty("--names", `min(30%, ${longest + 5}ch)`);
 }
 
 function showStages() {

@@ -158,7 +158,8 @@ function paintPlane(height) {
   pen.globalAlpha = 0.6;
   pen.stroke();
   pen.globalAlpha = 1;
-  labels.push({ p: corners[0], text: `contact at z = ${number(height * MILLIMETRES, 1)} mm`, quiet: true });
+  const inside = corners.find(({ x, y }) => x > 0 && y > 0 && x < canvas.clientWidth && y < canvas.clientHeight);
+  labels.push({ p: inside ?? corners[0], text: `contact at z = ${number(height * MILLIMETRES, 1)} mm`, quiet: true });
 }
 
 function paintFloor() {
