@@ -36,19 +36,15 @@ class LimitSpan:
     share: float
 
 
-def limit_spans(
-    limits: JointLimits, t: Array, q: Array, qd: Array, qdd: Array, tau: Array | None = None
-) -> Iterator[LimitSpan]:
+def limit_spans(limits: JointLimits, motion: tuple[Array, Array, Array, Array, Array | None]) -> Iterator[LimitSpan]:
     """Yield when joints reach 99.9 % of their limits, by limit and joint.
 
     Args:
         limits: of n joints.
-        t: (k,) instants [s].
-        q: (k, n) positions [rad] or [m].
-        qd: (k, n) speeds.
-        qdd: (k, n) accelerations.
-        tau: (k, n) efforts [N m] or [N]; None where they are unknown.
+        motion: (k,) instants [s]; (k, n) positions [rad] or [m], speeds, accelerations, and efforts [N m] or [N], which
+            may be unknown.
     """
+    t, q, qd, qdd, tau = motion
     with np.errstate(invalid="ignore"):
         # Without both ends there is no middle, and no share.
         shares: dict[LimitKind, Array] = {"position": np.abs(2 * q - limits.lower - limits.upper)}

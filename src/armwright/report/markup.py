@@ -93,7 +93,7 @@ def _to_json_types(value: object) -> object:
     if attrs.has(type(value)):
         return {
             field.name: _exact(item) if field.metadata.get("exact") else _to_json_types(item)
-            for field in attrs.fields(type(value))
+            for field in attrs.fields(type(value))  # type: ignore[arg-type]
             for item in [getattr(value, field.name)]
         }
     if isinstance(value, Mapping):

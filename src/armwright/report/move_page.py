@@ -70,7 +70,9 @@ def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
         distance = move.passing_distances[i]
         how = f"with a deviation of {distance * 1e3:.1f} mm" if move.tool_path else "approximately"
-        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {'reached' if distance == 0 else f'passed {how}'}", arm=_ARM)
+        yield Effect(
+            t0=t, t1=t, line=line, text=f"pose {name} {'reached' if distance == 0 else f'passed {how}'}", arm=_ARM
+        )
 
 
 def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterator[StageRow]:

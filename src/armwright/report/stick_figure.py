@@ -27,7 +27,7 @@ def arm_record(
         motion: (k,) times [s]; (k, n) positions, speeds, accelerations and efforts of its joints.
         base: (4, 4) pose of the arm in the world; the world itself when left out.
     """
-    at_limits = list(limit_spans(arm.limits, *motion))
+    at_limits = list(limit_spans(arm.limits, motion))
     t, q, qd, qdd, tau = (values[thinned_rows(len(motion[0]))] for values in motion)
     joints = [
         JointInfo(name=f"joint {i}", kind=joint.kind, **attrs.asdict(joint.limits))

@@ -22,7 +22,17 @@ from armwright.studio.workbench import Workbench
 from armwright.version import __version__
 
 # Of the pages of results, and then those of the studio.
-_SHARED_SCRIPTS = ("basics.js", "scene.js", "poses.js", "camera.js", "meshes.js", "surface.js", "gl.js", "labels.js", "view.js")
+_SHARED_SCRIPTS = (
+    "basics.js",
+    "scene.js",
+    "poses.js",
+    "camera.js",
+    "meshes.js",
+    "surface.js",
+    "gl.js",
+    "labels.js",
+    "view.js",
+)
 _SCRIPTS = (
     "live.js",
     "overlays.js",

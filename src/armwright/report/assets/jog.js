@@ -46,8 +46,7 @@ function showReadout() {
   const q = arm && shownPositions(arm);
   if (!q) return;
   const jogged = Boolean(now.jog?.[arm.name]);
-  const said = jogged ? ", moved by hand" : arm.measured ? ", measured" : "";
-  byId("readout-name").textContent = `Joints of ${arm.name}${said}`;
+  byId("readout-name").textContent = `Joints of ${arm.name}${arm.measured && !jogged ? ", measured" : ""}`;
   [...byId("joints").children].forEach((row, j) => {
     const [_, input, value] = row.children;
     if (Number(input.value) !== q[j]) input.value = q[j];
@@ -55,7 +54,8 @@ function showReadout() {
   });
   const figure = data.animation?.arms[arm.name];
   const instant = figure && locate(data.animation.t, now.t);
-  const hand = (arm.measured || jogged) && figure ? toolOf(arm, figure).slice(9) : blend(arm.hand, presentRow(arm));
+  const drawn = figure && (arm.measured || jogged);
+  const hand = drawn ? toolOf(arm, figure).slice(9) : blend(arm.hand, presentRow(arm));
   const parts = [["hand", `${placeText(hand)} mm`]];
   if (figure?.grip) parts.push(["gripper", gripText(gripOf(figure, instant), arm.measured && figure.opening)]);
   byId("hand").replaceChildren(

@@ -13,6 +13,9 @@ const LABEL_PLACES = [0, 1, 2, 3].flatMap((far) => [
   [-1, 1 + far],
 ]);
 
+// So many names of one point are told, and others counted.
+const MOST_NAMES = 3;
+
 // Names of one point are joined.
 function joinedLabels() {
   const joined = [];
@@ -24,8 +27,12 @@ function joinedLabels() {
         other.hidden === label.hidden &&
         Math.hypot(other.p.x - label.p.x, other.p.y - label.p.y) < 9,
     );
-    if (near) near.text += `, ${label.text}`;
-    else joined.push({ ...label });
+    if (near) near.names.push(label.text);
+    else joined.push({ ...label, names: [label.text] });
+  }
+  for (const label of joined) {
+    const more = label.names.length - MOST_NAMES;
+    label.text = label.names.slice(0, MOST_NAMES).join(", ") + (more > 0 ? ` +${more}` : "");
   }
   return joined;
 }

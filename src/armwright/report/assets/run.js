@@ -139,7 +139,7 @@ function start() {
 window.armwright = {
   seek,
   bodies: () => bodiesAt(now.t).bodies,
-  tool: () => toolOf(chosenArm(), data.animation.arms[chosenArm().name]),
+  drawnBy: () => (graphics ? "processor" : "painter"),
   labels: () => labelBoxes.map(({ x, y, wide }) => ({ x, y, wide, high: LABEL_HEIGHT })),
   state: () => {
     const arm = chosenArm();
@@ -150,6 +150,7 @@ window.armwright = {
       arm: arm?.name ?? null,
       q: place ? (now.jog?.[arm.name] ?? blend(arm.q, place)) : [],
       hand: place ? blend(arm.hand, place) : null,
+      tool: place && data.animation ? toolOf(arm, data.animation.arms[arm.name]) : null,
       jog: Boolean(now.jog),
       line: data.effects[presentEffect()]?.line ?? null,
       stage: arm ? stageAt(arm.name, now.t) : -1,

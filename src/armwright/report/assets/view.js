@@ -221,6 +221,7 @@ function drawView() {
   if (!data.animation || !canvas.clientWidth) return;
   let width, height;
   [pen, width, height] = sharpen(canvas);
+  pen.lineCap = "butt";
   lens = aim(width, height);
   labels = [];
   const { place, bodies, arms } = bodiesAt(now.t);
