@@ -264,6 +264,7 @@ class Visit:
         """Hear nothing more of the page, and go elsewhere."""
         for event, hear in self._heard.items():
             self.page.remove_listener(event, hear)
+        self.page.emulate_media(media="screen")
         self.page.goto("about:blank")
 
     def state(self) -> dict[str, Any]:

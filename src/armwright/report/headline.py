@@ -92,7 +92,9 @@ def _tracking(data: RunPage) -> Iterator[Figure]:
 
 
 def _deviation(data: RunPage) -> Iterator[Figure]:
-    stages = [(stage.deviation, i) for i, stage in enumerate(data.stages) if stage.deviation is not None]
+    """Yield the largest deviation from a line; from paths past frames, whose corners are rounded, only without one."""
+    known = [(stage.deviation, i) for i, stage in enumerate(data.stages) if stage.deviation is not None]
+    stages = [one for one in known if data.stages[one[1]].kind in {"LINE", "HAND"}] or known
     if stages:
         deviation, i = max(stages)
         yield Figure(f"{deviation * 1e3:.2f} mm", "largest path deviation", _during(data.stages[i]))

@@ -82,7 +82,14 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
     frames = [FrameTrack(name=name, poses=to_noap(X)[None]) for name, X in workbench.frame_poses().items()]
     fixtures = fixture_bodies(cell, shapes)
     animation = Animation(
-        fps=60.0, t=now, arms=figures, frames=frames, fixtures=fixtures, parts=parts, shapes=shapes.as_data()
+        fps=60.0,
+        t=now,
+        arms=figures,
+        frames=frames,
+        fixtures=fixtures,
+        parts=parts,
+        shapes=shapes.as_data(),
+        contact_plane=cell.contact.height,
     )
     rest = {name: np.zeros((1, len(arm.q))) for name, arm in workbench.arms.items()}
     still = {name: (now, arm.q[None], rest[name], rest[name], rest[name]) for name, arm in workbench.arms.items()}
