@@ -35,6 +35,8 @@ def test_numbers_of_a_run(bench: RunPage) -> None:
     assert shown["largest path deviation"].value == "0.34 mm"
     assert shown["limits reached"] == Figure("none", "limits reached")
     assert "least distance" not in shown
+    failed = figures(attrs.evolve(bench, status="failed: E406 at 8.9 s"))
+    assert failed["until the failure"] == Figure("9.00 s", "until the failure", "failed: E406 at 8.9 s")
 
 
 def test_the_least_distance(bench: RunPage) -> None:
@@ -76,7 +78,7 @@ def test_when_a_joint_is_at_its_limit() -> None:
     """A joint that is fast twice is at its limit in two spans, from the first instant to the last of each."""
     t = np.linspace(0.0, 10.0, 1001)
     qd = np.zeros((1001, 2))
-    qd[100:201, 1], qd[800:851, 1], qd[:, 0] = 2.0, -2.0, 1.99
+    qd[100:201, 1], qd[800:851, 1], qd[:, 0] = 2.0, -2.0, 1.98
     zero = np.zeros_like(qd)
     spans = list(limit_spans(limits(speed=2.0), (t, zero, qd, zero, None)))
 

@@ -53,7 +53,8 @@ def headline(data: RunPage) -> Iterator[Figure]:
     Args:
         data: of its page.
     """
-    yield Figure(f"{data.duration:.2f} s", "cycle time")
+    finished = data.status == "finished"
+    yield Figure(f"{data.duration:.2f} s", "cycle time" if finished else "until the failure", data.status)
     arms = {arm.name: arm for arm in data.arms}
     yield from _peak_effort(data, arms)
     yield from _tracking(data)

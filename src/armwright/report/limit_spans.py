@@ -11,8 +11,8 @@ from armwright.arrays import Array
 
 LimitKind = Literal["position", "speed", "acceleration", "effort"]
 
-# A joint is at a limit from this share of it on.
-_REACHED = 0.999
+# A joint is at a limit from this share of it on, which is shown as 100 %.
+_REACHED = 0.995
 # Spans that are nearer to each other than this share of the motion are one.
 _GAP = 1 / 400
 
@@ -37,7 +37,7 @@ class LimitSpan:
 
 
 def limit_spans(limits: JointLimits, motion: tuple[Array, Array, Array, Array, Array | None]) -> Iterator[LimitSpan]:
-    """Yield when joints reach 99.9 % of their limits, by limit and joint.
+    """Yield when joints reach 99.5 % of their limits, by limit and joint.
 
     Args:
         limits: of n joints.

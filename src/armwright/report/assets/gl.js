@@ -107,6 +107,7 @@ function startGraphics() {
   if (!seen || !shade) return null;
   canvas.addEventListener("webglcontextlost", () => {
     graphics = null;
+    drawView();
   });
   const solids = meshes.map((mesh) => uploadedMesh(gl, mesh));
   const floor = uploadedMesh(gl, boxMesh([1, 1, 0]));
