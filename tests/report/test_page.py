@@ -576,11 +576,13 @@ def test_a_track_for_each_arm(visit, bench) -> None:
 
 
 def test_a_line_for_each_process(visit, bench) -> None:
-    """Every process that goes on has its line marked in the colour of its arm, and one that has ended none."""
+    """Every process that goes on has its line marked in the colour of its arm, and one that waits for others or has ended none."""
     effects = (
+        Effect(t0=0.0, t1=0.0, line=6, text="COBEGIN", process="program"),
         Effect(t0=0.0, t1=5.0, line=8, text="ARM_1 MOVE", process="branch 1", arm="ARM_1"),
         Effect(t0=0.0, t1=2.0, line=9, text="ARM_2 MOVE", process="branch 2", arm="ARM_2"),
         Effect(t0=2.0, t1=9.0, line=10, text="WAIT", process="branch 2"),
+        Effect(t0=9.0, t1=9.0, line=14, text="END", process="program"),
     )
     opened = visit(attrs.evolve(bench, effects=effects))
     marked = """[...document.querySelectorAll('#program li')].flatMap((row, i) =>

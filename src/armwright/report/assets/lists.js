@@ -64,16 +64,13 @@ function showLine(number) {
 // Effects of one process each, in order.
 const processes = [...new Set(data.effects.map((effect) => effect.process))];
 
-// The present effect of every process that has begun and goes on; of the one chosen by hand, or begun last, in any case.
+// The present effect of every process that does something now, and the one that was chosen by hand or begun last.
 function presentEffects() {
   const latest = presentEffect();
   return processes.flatMap((process) => {
     if (data.effects[latest]?.process === process) return [latest];
-    const own = data.effects.flatMap((effect, i) => (effect.process === process ? [i] : []));
-    const begun = own.filter((i) => data.effects[i].t0 <= now.t + HAIR);
-    const present = begun.at(-1);
-    const ended = begun.length === own.length && data.effects[present].t1 < now.t - HAIR;
-    return begun.length && !ended ? [present] : [];
+    const present = data.effects.findLastIndex((one) => one.process === process && one.t0 <= now.t + HAIR);
+    return present >= 0 && data.effects[present].t1 >= now.t - HAIR ? [present] : [];
   });
 }
 
