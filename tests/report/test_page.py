@@ -576,7 +576,7 @@ def test_a_track_for_each_arm(visit, bench) -> None:
 
 
 def test_a_line_for_each_process(visit, bench) -> None:
-    """Every process that goes on has its line marked in the colour of its arm, and one that waits for others or has ended none."""
+    """Every process that goes on has its line marked in the colour of its arm; one that waits or has ended has none."""
     effects = (
         Effect(t0=0.0, t1=0.0, line=6, text="COBEGIN", process="program"),
         Effect(t0=0.0, t1=5.0, line=8, text="ARM_1 MOVE", process="branch 1", arm="ARM_1"),
