@@ -96,7 +96,7 @@ EXHIBITS = (
         says="A PUMA locates a shaft with its camera and inserts it into a gearbox. The page shows the animated arm, "
         "the current line of the program, every motion stage, and position, velocity, acceleration and effort of all "
         "joints with their limits.",
-        alt="The page of a run: an arm above a table with a shaft in its gripper, the program beside it, charts below",
+        alt="The page of a run: its numbers, an arm with a shaft in its gripper, the program and the joints beside it",
         command="run examples/gearbox.rlo --cell examples/puma_cell.toml",
         moment=0.62,
     ),

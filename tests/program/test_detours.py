@@ -20,8 +20,8 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.vm.interpreter import interpret, motion_warnings
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Recording, RunStage
+from armwright.report.stage_badges import stage_badges
 from armwright.spatial.rotations import angle_between
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -113,7 +113,8 @@ def test_the_warning(by: Around) -> None:
     assert seam_error().notes[0] in warning.notes[0]
     assert ("via pose" if by == "via" else "damped least squares") in warning.notes[1]
     assert re.search(r"[\d.]+ mm off the line, [\d.]+ mrad, \+[\d.]+ s$", warning.message)
-    assert "the straight line is infeasible at 50 % of the path" in stage_note(the_line(recording))
+    badge = next(badge for badge in stage_badges(the_line(recording)) if badge.text.startswith("detour"))
+    assert "the straight line is infeasible at 50 % of the path" in badge.title
 
 
 @pytest.mark.parametrize("by", ["via", "damped"])

@@ -11,10 +11,13 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.report.animation import Animation, ArmFigure, Body, ChainJoint, FrameTrack, TreeChange
-from armwright.report.page import ArmRecord, Effect, JointInfo, Message, RunPage, StageRow, run_page
+from armwright.report.page import ArmRecord, Effect, JointInfo, Message, RunPage, StageBadge, StageRow, run_page
 
 FPS = 25.0
 SHOULDER, UPPER, FORE, HAND = 0.42, 0.43, 0.40, 0.14
+SLOWED = StageBadge(
+    text="speed j2", title="1.20 times slower, limited by the speed of joint 2", mark="warn", factor=1.2
+)
 PROGRAM = """\
 { Carry a part from the feeder to the fixture;
   the second arm looks on and then makes room. }
@@ -158,7 +161,7 @@ def bench_run() -> RunPage:
     stages = (
         stage_of(first, 0.0, 1.6, "PTP", ("above",), line=8),
         stage_of(first, 1.6, 2.3, "LINE", ("part",), line=8, deviation=0.00021),
-        stage_of(first, 2.5, 3.8, "SPLINE", ("above", "fixture"), line=11, note="slowed by joint 2 speed"),
+        stage_of(first, 2.5, 3.8, "SPLINE", ("above", "fixture"), line=11, badges=(SLOWED,)),
         stage_of(first, 3.8, 5.1, "LINE", ("fixture",), line=11, deviation=0.00034),
         stage_of(second, 5.3, 8.8, "PTP", ("above",), line=14),
     )
@@ -261,6 +264,7 @@ class Visit:
         """Hear nothing more of the page, and go elsewhere."""
         for event, hear in self._heard.items():
             self.page.remove_listener(event, hear)
+        self.page.emulate_media(media="screen")
         self.page.goto("about:blank")
 
     def state(self) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from armwright.report.shape_table import ShapeTable, coarse_mesh, shape_data
 from armwright.report.tracking import measured_motion, seen_pictures
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.rotations import elementary_rotation
-from armwright.spatial.shapes import Box, Mesh, Sphere, is_closed, volume
+from armwright.spatial.shapes import Box, Mesh, Solid, Sphere, is_closed, volume
 from oracles.stocked_cell import stocked_run, torus, with_solids
 
 # The page carries five significant digits of joint positions, and six decimals of lengths.
@@ -171,6 +171,25 @@ def test_a_column_below_a_raised_arm(tmp_path: Path) -> None:
     assert list(columns) == ["ARM_1 column"]
     assert animation.shapes[columns["ARM_1 column"].shape]["length"] == pytest.approx(0.3)
     np.testing.assert_allclose(columns["ARM_1 column"].pose[9:], (0, 0, -0.15), atol=1e-12)
+
+
+def test_a_column_below_solids(tmp_path: Path) -> None:
+    """Where the base has solids the column goes from the floor to the lowest of them; down on the floor is none."""
+    recording = stocked_run(tmp_path)
+    given = recording.cell.arms["ARM_1"]
+    foot = Solid(shape=Box(size=[0.2, 0.2, 0.1]), pose=homogeneous(np.eye(3), [0.0, 0.0, 0.05]))
+    heights = {}
+    for height in (0.0, 0.3):
+        base = given.base.copy()
+        base[:3, 3] = 2.0, 0.0, height
+        arm = attrs.evolve(given, base=base, arm=attrs.evolve(with_solids(given.arm), base_solids=(foot,)))
+        cell = attrs.evolve(recording.cell, arms={**recording.cell.arms, "ARM_1": arm})
+        animation = page_of(attrs.evolve(recording, cell=cell)).animation
+        assert animation is not None
+        columns = [body for body in animation.arms["ARM_1"].bodies if "column" in body.name]
+        heights[height] = [animation.shapes[body.shape]["length"] for body in columns]
+
+    assert heights == {0.0: [], 0.3: [pytest.approx(0.3)]}
 
 
 # ---- files -----------------------------------------------------------------------------------------------------------
@@ -362,6 +381,20 @@ def test_every_shape_is_drawn(visit) -> None:
 
 
 @pytest.mark.browser
+def test_the_contact_plane_is_drawn(visit) -> None:
+    """The plane of contact of a cell is seen with its height; a cell without one has none."""
+    page = two_parts(np.eye(4), homogeneous(np.eye(3), [0.3, 0, 0]), (0.1, 0.1, 0.1))
+    assert page.animation is not None
+    with_plane = attrs.evolve(page, animation=attrs.evolve(page.animation, contact_plane=0.045))
+    without, seen = visit(page), visit(with_plane)
+
+    assert seen.pixels() != without.pixels()
+    count = [len(it.page.evaluate("armwright.labels()")) for it in (without, seen)]
+    assert count[1] == count[0] + 1
+    assert seen.complaints == []
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("width", [390, 1280])
 def test_names_do_not_overprint(visit, stocked: Recording, width: int) -> None:
     """At no time and from no side two names of the view overlap."""
@@ -437,11 +470,11 @@ def test_errors_of_a_cell_with_physics(visit, stocked: Recording) -> None:
 
 @pytest.mark.browser
 def test_long_lists_on_paper(visit, stocked: Recording) -> None:
-    """On paper the list of what happened is as long as it must be, and the table of stages is below it."""
+    """On paper the list of what happened is as long as it must be, and the frames are below it."""
     page = visit(page_of(stocked), viewport={"width": 700, "height": 900}).page
     page.emulate_media(media="print")
     rows = "[...document.querySelectorAll('#trace button')].map((row) => row.getBoundingClientRect().bottom)"
-    below = "document.querySelector('#stages-card').getBoundingClientRect().top"
+    below = "document.querySelector('#tree-card').getBoundingClientRect().top"
 
     assert len(page.evaluate(rows)) > 5
     assert max(page.evaluate(rows)) <= page.evaluate(below)
@@ -519,14 +552,14 @@ def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
         opened.seek(t)
         assert drawn("BLOCK")[0][10] == pytest.approx(y, abs=1e-3)
     joints = opened.page.locator("#readout")
-    assert joints.locator("h3").inner_text() == f"Joints of {stream.arm}, measured"
+    assert joints.locator("h2").inner_text() == f"Joints of {stream.arm}, measured"
     assert "mm open" in joints.inner_text()
     before = opened.pixels()
-    opened.page.click("#planned")
+    opened.page.click("[data-layer=planned]")
     assert opened.pixels() != before
-    opened.page.click("#planned")
+    opened.page.click("[data-layer=planned]")
     assert opened.pixels() == before
-    assert not visit(page_of(stocked)).page.locator("#planned").is_visible()
+    assert not visit(page_of(stocked)).page.locator("[data-layer=planned]").is_visible()
     assert opened.complaints == []
 
 

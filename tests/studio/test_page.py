@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from armwright.cell.reader import read_cell
+from armwright.studio.page import studio_page
+from armwright.studio.workbench import Workbench
 
 pytest.importorskip("websockets")
 CELL = """\
@@ -326,3 +328,12 @@ def test_by_keyboard_alone(opened: Opened) -> None:
     opened.until(lambda: opened.state()["run"] is not None)
     page.keyboard.press("Shift+F5")
     opened.until(lambda: opened.state()["run"] is None)
+
+
+def test_the_page_is_small(tmp_path: Path) -> None:
+    """Without meshes the page has less than 150 kB, scripts, style and data of two arms together."""
+    second = CELL[CELL.index("[arms.ARM_1]") : CELL.index("[frames]")].replace("ARM_1", "ARM_2")
+    base = "base = [1, 0, 0,  0, 1, 0,  0, 0, 1,  2, 0, 0]\n"
+    (tmp_path / "bench.toml").write_text(CELL + second.replace("hand = ", base + "hand = ").replace("0.45,", "2.45,"))
+    page = studio_page(Workbench(read_cell(tmp_path / "bench.toml")), token="t", policy="p")
+    assert len(page.encode()) < 150_000

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import attrs
 
 from armwright.arrays import Array
+from armwright.report.markup import EXACT
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -43,9 +44,9 @@ class ChainJoint:
     """
 
     revolute: bool
-    theta: float
-    d: float
-    behind: Array
+    theta: float = attrs.field(metadata=EXACT)
+    d: float = attrs.field(metadata=EXACT)
+    behind: Array = attrs.field(metadata=EXACT)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -59,16 +60,16 @@ class ArmFigure:
         joints: n joints from base to hand.
         tool: (12,) the tool in the last frame.
         bodies: what is drawn.
-        grip: (M,) 0 closed to 1 open.
+        grip: (M,) 0 closed to 1 open; None of an arm without a gripper.
         opening: distance between the open fingers [m].
     """
 
     q: Array
-    base: Array
+    base: Array = attrs.field(metadata=EXACT)
     joints: Sequence[ChainJoint]
-    tool: Array
+    tool: Array = attrs.field(metadata=EXACT)
     bodies: Sequence[Body]
-    grip: Array
+    grip: Array | None
     opening: float
     planned: Array | None = None
 
@@ -137,6 +138,7 @@ class Animation:
         shapes: the shapes of all bodies, as of ``shape_table``.
         fixtures: bodies that stand.
         parts: bodies that are moved.
+        contact_plane: height of the plane of contact of the cell [m]; None without one.
     """
 
     fps: float
@@ -147,3 +149,4 @@ class Animation:
     shapes: Sequence[Mapping[str, Any]] = ()
     fixtures: Sequence[Body] = ()
     parts: Sequence[MovedPart] = ()
+    contact_plane: float | None = None

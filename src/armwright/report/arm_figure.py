@@ -18,7 +18,7 @@ from armwright.report.animation import ArmFigure, Body, ChainJoint
 from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.rotations import rotation_with_z
-from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from armwright.spatial.shapes import Box, Capsule, Cylinder, Shape, Sphere, support
 
 # Where nothing is checked for collisions, guessed links are drawn slimmer, towards the tool more so.
 _SLIM = (0.8, 0.45)
@@ -50,19 +50,19 @@ class Placed(NamedTuple):
     as_checked: bool = False
 
 
-def arm_figure(name: str, placed: Placed, q: Array, grip: Array, shapes: ShapeTable) -> ArmFigure:
+def arm_figure(name: str, placed: Placed, q: Array, grip: Array | None, shapes: ShapeTable) -> ArmFigure:
     """Return the figure of an arm.
 
     Args:
         name: its name.
         placed: the arm and where it stands.
         q: (M, n) joint positions at the instants of the animation [rad] or [m].
-        grip: (M,) opening of the fingers, 0 to 1.
+        grip: (M,) opening of the fingers, 0 to 1; None of an arm without a gripper.
         shapes: collects the shapes of the page.
     """
     arm = placed.arm
     opening = opening_of(placed)
-    drawn = [*_links(name, placed), *_gripper(name, placed, opening)]
+    drawn = [*_links(name, placed), *(() if grip is None else _gripper(name, placed, opening))]
     return ArmFigure(
         q=q,
         base=to_noap(placed.base @ arm.base),
@@ -90,8 +90,7 @@ def _links(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
             yield _body(body.name, body.solid.pose, body.link, "base" if body.link == 0 else "link"), body.solid.shape
     else:
         yield from _guessed(name, placed, solids)
-    if not arm.base_solids:
-        yield from _column(name, placed)
+    yield from _column(name, placed)
 
 
 def _guessed(name: str, placed: Placed, solids: list[SolidBody]) -> Iterator[tuple[Body, Shape]]:
@@ -123,9 +122,11 @@ def _guessed(name: str, placed: Placed, solids: list[SolidBody]) -> Iterator[tup
 
 
 def _column(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
-    """Yield the column below a base that stands above the floor."""
+    """Yield the column below a base that stands above the floor: from the floor to its lowest solid, or its origin."""
     X = placed.base @ placed.arm.base
-    high = float(X[2, 3]) - placed.floor
+    solids = [(placed.base @ solid.pose, solid.shape) for solid in placed.arm.base_solids]
+    bottoms = [float(Y[2, 3]) - support(shape, -Y[2, :3]) for Y, shape in solids]
+    high = min(bottoms, default=float(X[2, 3])) - placed.floor
     if X[2, 2] > _UPRIGHT and high > 1e-3:
         radius = 0.05 * _length(placed.arm)
         pose = np.linalg.inv(X) @ homogeneous(np.eye(3), [X[0, 3], X[1, 3], placed.floor + high / 2])

@@ -104,7 +104,7 @@ class _Writer:
 
     def _add_body(self, body: Body, figure: ArmFigure, parent: int) -> None:
         X, mesh = from_noap(body.pose)[None], self._mesh(body.shape, body.tint)
-        if body.slide:
+        if body.slide and figure.grip is not None:
             offsets = np.zeros((len(figure.q), 3))
             offsets[:, 1] = body.slide * figure.grip * figure.opening / 2
             X = homogeneous(np.broadcast_to(np.eye(3), (len(offsets), 3, 3)), offsets) @ X

@@ -16,6 +16,8 @@ from armwright.arrays import Array
 _DIGITS, _DIGITS_OF_SCALARS = 5, 8
 # Decimals at most; smaller parts of a number are rounding errors.
 _DECIMALS = 7
+# Metadata of an attrs field with numbers from which a page computes others: all their digits are written.
+EXACT = {"exact": True}
 # Stands for a row that equals the previous row.
 _REPEATED_ROW = 0
 _NO_SCRIPTS_NOTE = (
@@ -89,12 +91,21 @@ def _to_json_types(value: object) -> object:
     if isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
         return _round_significant(float(value), _DIGITS_OF_SCALARS)
     if attrs.has(type(value)):
-        return {name: _to_json_types(item) for name, item in attrs.asdict(value, recurse=False).items()}  # type: ignore[arg-type]
+        return {
+            field.name: _exact(item) if field.metadata.get("exact") else _to_json_types(item)
+            for field in attrs.fields(type(value))  # type: ignore[arg-type]
+            for item in [getattr(value, field.name)]
+        }
     if isinstance(value, Mapping):
         return {str(key): _to_json_types(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_to_json_types(item) for item in value]
     return value
+
+
+def _exact(value: float | np.ndarray) -> object:
+    """Return numbers with all their digits."""
+    return value.tolist() if isinstance(value, np.ndarray) else float(value)
 
 
 def _round_significant(number: float, digits: int) -> float | int | None:

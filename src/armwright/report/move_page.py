@@ -6,12 +6,13 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.detour import Detour
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
 from armwright.report.animation import Animation, FrameTrack
 from armwright.report.arm_figure import Placed, arm_figure
-from armwright.report.page import Effect, Message, RunPage, StageRow
+from armwright.report.page import Effect, Message, RunPage, StageBadge, StageRow
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
 from armwright.spatial.poses import to_noap
@@ -69,7 +70,9 @@ def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
         distance = move.passing_distances[i]
         how = f"with a deviation of {distance * 1e3:.1f} mm" if move.tool_path else "approximately"
-        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {'reached' if distance == 0 else f'passed {how}'}")
+        yield Effect(
+            t0=t, t1=t, line=line, text=f"pose {name} {'reached' if distance == 0 else f'passed {how}'}", arm=_ARM
+        )
 
 
 def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterator[StageRow]:
@@ -92,8 +95,12 @@ def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterat
             peak_effort=np.abs(tau[during]).max(axis=0).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
             deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
-            note=f"by {detour.method}: {detour.price}" if detour and detour.method != "line" else "",
+            badges=[_detour_badge(detour)] if detour and detour.method != "line" else [],
         )
+
+
+def _detour_badge(detour: Detour) -> StageBadge:
+    return StageBadge(text=f"detour {detour.method}", title=f"by {detour.method}: {detour.price}", mark="warn")
 
 
 def _animation(move: Move, file: PosesFile) -> Animation:
@@ -101,7 +108,7 @@ def _animation(move: Move, file: PosesFile) -> Animation:
     fps = min(max(_INSTANTS / duration, _FPS[0]), _FPS[1], _MAX_FRAMES / duration)
     t = np.append(np.arange(int(np.ceil(duration * fps))) / fps, duration)
     shapes = ShapeTable()
-    figure = arm_figure(_ARM, Placed(move.arm), move.trajectory(t), np.ones(len(t)), shapes)
+    figure = arm_figure(_ARM, Placed(move.arm), move.trajectory(t), None, shapes)
     tracks = [
         FrameTrack(name=name, poses=to_noap(np.tile(X, (len(t), 1, 1))))
         for name, X in zip(file.names, move.poses, strict=True)

@@ -6,6 +6,7 @@ its scripts and its data, and uses no network.
 
 import math
 from collections.abc import Iterator, Sequence
+from string import Template
 from typing import Literal
 
 import attrs
@@ -15,6 +16,8 @@ from armwright.arrays import Array
 from armwright.report.animation import Animation
 from armwright.report.collision_text import NOT_CHECKED
 from armwright.report.elements import badge, facts
+from armwright.report.headline import headline, headline_list
+from armwright.report.limit_spans import LimitSpan
 from armwright.report.markup import asset, page_html
 
 _SCRIPTS = (
@@ -23,11 +26,14 @@ _SCRIPTS = (
     "camera.js",
     "meshes.js",
     "surface.js",
+    "gl.js",
     "labels.js",
     "view.js",
     "charts.js",
     "joint_charts.js",
     "lists.js",
+    "stages.js",
+    "jog.js",
     "pictures.js",
     "run.js",
 )
@@ -60,6 +66,7 @@ class Effect:
         line: line of the program, from 1.
         text: its effect, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
         process: its process, such as ``branch 2``; empty where there is only one process.
+        arm: name of the arm that did it; empty where none did.
     """
 
     t0: float
@@ -67,6 +74,7 @@ class Effect:
     line: int
     text: str
     process: str = ""
+    arm: str = ""
 
 
 @attrs.frozen(kw_only=True)
@@ -87,6 +95,23 @@ class LeastDistance:
 
 
 @attrs.frozen(kw_only=True)
+class StageBadge:
+    """A remark on a stage.
+
+    Attributes:
+        text: in a few letters, such as ``acc j4``.
+        title: in a sentence.
+        mark: ``good``, ``warn`` or ``bad``; empty where it is neither.
+        factor: how many times slower the stage is for it; None where it is not.
+    """
+
+    text: str
+    title: str
+    mark: Literal["", "good", "warn", "bad"] = ""
+    factor: float | None = None
+
+
+@attrs.frozen(kw_only=True)
 class StageRow:
     """A stage of a motion.
 
@@ -102,7 +127,7 @@ class StageRow:
         peak_effort: n largest torques [N m] or forces [N]; None where no dynamics was computed.
         hand_length: length of the path of the tool [m].
         deviation: largest distance from the straight line [m]; None without a line.
-        note: a remark, such as ``slowed by joint 2 speed``.
+        badges: remarks.
         clearance: the least distance to other bodies; None where there is nothing to meet.
     """
 
@@ -117,7 +142,7 @@ class StageRow:
     peak_effort: Sequence[float] | None = None
     hand_length: float
     deviation: float | None = None
-    note: str = ""
+    badges: Sequence[StageBadge] = ()
     clearance: LeastDistance | None = None
 
 
@@ -182,6 +207,7 @@ class ArmRecord:
         tau: (N, n) torques [N m] or forces [N]; None where no dynamics was computed.
         hand: (N, 3) positions of the tool in the world [m].
         measured: what was measured; None where nothing was.
+        at_limits: when joints are at their limits.
     """
 
     name: str
@@ -194,6 +220,7 @@ class ArmRecord:
     tau: Array | None = None
     hand: Array
     measured: MeasuredMotion | None = None
+    at_limits: Sequence[LimitSpan] = ()
 
 
 @attrs.frozen(kw_only=True)
@@ -275,16 +302,15 @@ def run_page(data: RunPage) -> str:
         title=data.title,
         badge=badge(data.status, good=data.status == "finished"),
         facts=facts(_facts(data)),
-        main=asset("run.html"),
+        main=Template(asset("run.html")).substitute(headline=headline_list(headline(data))),
         styles=("run.css",),
         scripts=_SCRIPTS,
         data=data,
-        generated=f"Made by {data.generated_by}",
+        generated=f"{data.generated_by}: {data.command}" if data.command else data.generated_by,
     )
 
 
 def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
-    yield "Duration", f"{data.duration:.2f} s"
     if data.arms:
         yield "Arms", ", ".join(f"{arm.name} ({arm.model})" for arm in data.arms)
     if data.cell_name:
@@ -293,4 +319,3 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.physics:
         yield "Physics", data.physics
     yield "Collisions", data.collisions
-    yield "Command", data.command

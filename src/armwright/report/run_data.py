@@ -14,14 +14,14 @@ from armwright.cell.observations import MeasuredStream
 from armwright.kinematics.forward_kinematics import forward
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, excerpt, omission_text, shorten_line
-from armwright.program.vm.move_diagnostics import stage_note
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.animation import Animation, FrameTrack, TreeChange
 from armwright.report.arm_figure import arm_figure, opening_of
 from armwright.report.collision_text import collision_text
 from armwright.report.page import ArmRecord, Effect, LeastDistance, Message, RunPage, StageRow
-from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, moved_parts, placed_arms
+from armwright.report.run_scene import MAX_BODIES, finger_opening, fixture_bodies, has_gripper, moved_parts, placed_arms
 from armwright.report.shape_table import ShapeTable
+from armwright.report.stage_badges import stage_badges
 from armwright.report.stick_figure import arm_record
 from armwright.report.tracking import measured_motion, nearest_ticks, physics_text, seen_pictures
 from armwright.spatial.poses import to_noap
@@ -114,7 +114,8 @@ def _effects(recording: Recording) -> list[Effect]:
 
     def shown(effect: RunEffect) -> Effect:
         number, process = recording.code.source.line(effect.span.start), effect.process if several else ""
-        return Effect(t0=effect.t0, t1=effect.t1, line=number, text=shorten_line(effect.text), process=process)
+        text, arm = shorten_line(effect.text), effect.arm or ""
+        return Effect(t0=effect.t0, t1=effect.t1, line=number, text=text, process=process, arm=arm)
 
     omitted = [attrs.evolve(shown(effects.first[-1]), text=omission_text(effects.omitted))] if effects.omitted else []
     return effects.map(shown).join(*omitted)
@@ -133,7 +134,7 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
         peak_effort=run.peak_effort.tolist(),
         hand_length=run.length,
         deviation=run.stage.deviation,
-        note=stage_note(run),
+        badges=list(stage_badges(run)),
         clearance=_least_distance(run),
     )
 
@@ -160,9 +161,13 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
     changes, fewer_changes = _limit_items([*_tree_changes(recording, t)], MAX_LIST_ITEMS, "changes of the frame tree")
     shapes = ShapeTable()
     placed = placed_arms(recording.cell)
+    grips = {
+        name: finger_opening(recording, name, t, opening_of(placed[name])) if has_gripper(recording, name) else None
+        for name in q
+    }
     figures = {
         name: attrs.evolve(
-            arm_figure(name, placed[name], rows, finger_opening(recording, name, t, opening_of(placed[name])), shapes),
+            arm_figure(name, placed[name], rows, grips[name], shapes),
             planned=planned[name] if name in measured else None,
         )
         for name, rows in q.items()
@@ -177,6 +182,7 @@ def _animation(recording: Recording) -> tuple[Animation, list[str]]:
         fixtures=fixtures,
         parts=parts,
         shapes=shapes.as_data(),
+        contact_plane=recording.cell.contact.height,
     )
     all_bodies = {"bodies of the scene": recording.cell.fixtures, "parts": recording.cell.parts}
     fewer = [

@@ -120,6 +120,12 @@ def kept_poses(track: PartTrack, most: int) -> list[int]:
     return sorted(kept.union(moved[::stride]))
 
 
+def has_gripper(recording: Recording, arm: str) -> bool:
+    """Return whether an arm has a gripper: the cell says so, or the program uses one."""
+    used = any(effect.arm == arm and effect.kind in ("OPEN", "GRASP") for effect in recording.effects)
+    return used or recording.cell.arms[arm].gripper is not None
+
+
 def finger_opening(recording: Recording, arm: str, t: Array, opening: float) -> Array:
     """Return the opening of the fingers at each instant, 0 to 1: as it was measured, where there are fingers.
 

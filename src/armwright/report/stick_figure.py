@@ -9,6 +9,7 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
+from armwright.report.limit_spans import limit_spans
 from armwright.report.page import ArmRecord, JointInfo
 
 # Rows of the charts at most, which suffice for a screen.
@@ -26,13 +27,17 @@ def arm_record(
         motion: (k,) times [s]; (k, n) positions, speeds, accelerations and efforts of its joints.
         base: (4, 4) pose of the arm in the world; the world itself when left out.
     """
+    at_limits = list(limit_spans(arm.limits, motion))
     t, q, qd, qdd, tau = (values[thinned_rows(len(motion[0]))] for values in motion)
     joints = [
         JointInfo(name=f"joint {i}", kind=joint.kind, **attrs.asdict(joint.limits))
         for i, joint in enumerate(arm.joints, 1)
     ]
     poses = forward(arm, q) if base is None else base @ forward(arm, q)
-    return ArmRecord(name=name, model=arm.name, joints=joints, t=t, q=q, qd=qd, qdd=qdd, tau=tau, hand=poses[:, :3, 3])
+    hand = poses[:, :3, 3]
+    return ArmRecord(
+        name=name, model=arm.name, joints=joints, t=t, q=q, qd=qd, qdd=qdd, tau=tau, hand=hand, at_limits=at_limits
+    )
 
 
 def skeleton_points(arm: Arm, poses: Array) -> Array:

@@ -22,7 +22,17 @@ from armwright.studio.workbench import Workbench
 from armwright.version import __version__
 
 # Of the pages of results, and then those of the studio.
-_SHARED_SCRIPTS = ("basics.js", "scene.js", "poses.js", "camera.js", "meshes.js", "surface.js", "labels.js", "view.js")
+_SHARED_SCRIPTS = (
+    "basics.js",
+    "scene.js",
+    "poses.js",
+    "camera.js",
+    "meshes.js",
+    "surface.js",
+    "gl.js",
+    "labels.js",
+    "view.js",
+)
 _SCRIPTS = (
     "live.js",
     "overlays.js",
@@ -81,7 +91,14 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
     frames = [FrameTrack(name=name, poses=to_noap(X)[None]) for name, X in workbench.frame_poses().items()]
     fixtures = fixture_bodies(cell, shapes)
     animation = Animation(
-        fps=60.0, t=now, arms=figures, frames=frames, fixtures=fixtures, parts=parts, shapes=shapes.as_data()
+        fps=60.0,
+        t=now,
+        arms=figures,
+        frames=frames,
+        fixtures=fixtures,
+        parts=parts,
+        shapes=shapes.as_data(),
+        contact_plane=cell.contact.height,
     )
     rest = {name: np.zeros((1, len(arm.q))) for name, arm in workbench.arms.items()}
     still = {name: (now, arm.q[None], rest[name], rest[name], rest[name]) for name, arm in workbench.arms.items()}

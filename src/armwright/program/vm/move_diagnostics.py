@@ -143,35 +143,14 @@ def path_text(path: PlannedPath) -> str:
     return f"a path past other bodies was planned {by}, with {counted(path.checked, 'checked configuration')}"
 
 
-def _detour_course(detour: Detour, arm: str) -> str:
+def detour_course(detour: Detour, arm: str) -> str:
     """Return the course of a detour."""
     if detour.via is None:
         return "the tool follows the line by damped least squares, and deviates where the arm is nearly singular"
     return f"the tool stops at a via pose at {_position(detour.via[:3, 3])} mm from the base of {arm}"
 
 
-def stage_note(run: RunStage) -> str:
-    """Return what a report has to say beside a stage: where it was stopped, its detour, why it is slow."""
-    stage, where = run.stage, _stage_obstacle(run)
-    notes = [stage.slowed] if stage.slowed else []
-    if run.path is not None:
-        notes.append(path_text(run.path))
-    if run.stopped:
-        notes.append(
-            f"stopped on its path, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
-            f"of {stage.trajectory.duration:.3f} s and {stage.length * 1e3:.1f} mm"
-        )
-    if where and stage.detour is not None:
-        course = f"{_detour_course(stage.detour, run.arm)}: {stage.detour.price}"
-        notes = [f"the straight line is infeasible at {where}", course, *notes]
-    elif where:
-        notes.append(f"without stops the path is infeasible at {where}")
-    if stage.certificate is not None:
-        notes.append(stage.certificate.summary)
-    return "; ".join(notes)
-
-
-def _stage_obstacle(run: RunStage) -> str:
+def stage_obstacle(run: RunStage) -> str:
     """Return where a stage could not follow the path that was requested, and why; empty where it did."""
     obstacle = run.stage.obstacle
     return "" if obstacle is None else obstacle_location(obstacle, run.stage.kind, run.goal_names, run.arm)
@@ -185,7 +164,7 @@ def obstacle_warning(run: RunStage) -> Diagnostic | None:
     obstacle, detour = run.stage.obstacle, run.stage.detour
     if obstacle is None:
         return None
-    goal, where, begun = run.goal_names[-1], _stage_obstacle(run), f"begun at {run.t0:.3f} s"
+    goal, where, begun = run.goal_names[-1], stage_obstacle(run), f"begun at {run.t0:.3f} s"
     if detour is None:
         return Diagnostic(
             code="W403",
@@ -202,7 +181,7 @@ def obstacle_warning(run: RunStage) -> Diagnostic | None:
         message=f"{run.arm} leaves the straight line to `{goal}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
         label=f"infeasible at {obstacle.fraction * 100:.0f} % of the path; {begun}",
-        notes=(f"the line is infeasible at {where}", _detour_course(detour, run.arm)),
+        notes=(f"the line is infeasible at {where}", detour_course(detour, run.arm)),
     )
 
 

@@ -10,8 +10,9 @@ function expand(rows) {
   return rows && rows.map((row) => (last = row === 0 ? last : row));
 }
 
-// The only thing on the page that changes. `picked` is an effect chosen by hand: several may begin at one instant.
-const now = { t: 0, playing: false, rate: 1, arm: 0, picked: null };
+// The only thing on the page that changes. `picked` is an effect chosen by hand: several may begin at one instant; `jog`
+// are the joint positions of arms that were moved by hand, by name, null where the run is shown.
+const now = { t: 0, playing: false, rate: 1, arm: 0, picked: null, jog: null };
 const listeners = [];
 
 function changed() {
@@ -21,6 +22,7 @@ function changed() {
 function seek(t, picked = null) {
   now.t = Math.min(Math.max(Number(t) || 0, 0), data.duration);
   now.picked = picked;
+  now.jog = null;
   changed();
 }
 

@@ -63,46 +63,36 @@ function zoom(factor) {
   camera.distance = Math.min(Math.max(camera.distance * factor, 0.25 * scenery.size), 12 * scenery.size);
 }
 
-// How far a shape reaches from its origin.
-function reachOf(shape) {
-  if (shape.kind === "box") return length(shape.size) / 2;
-  if (shape.kind === "mesh") return Math.max(...triples(shape.vertices).map(length));
-  return Math.hypot(shape.radius, (shape.length ?? 0) / 2);
-}
-
 function extent(points) {
   const low = [0, 1, 2].map((k) => points.reduce((least, p) => Math.min(least, p[k]), Infinity));
   const high = [0, 1, 2].map((k) => points.reduce((most, p) => Math.max(most, p[k]), -Infinity));
   return { low, high, size: Math.max(length(plus(high, low, -1)), 0.05) };
 }
 
-// The corners of the box about a body that stands.
-function boundsOf(shape, X) {
-  const half = shape.kind === "box" ? shape.size.map((v) => v / 2) : [0, 0, 0].fill(reachOf(shape));
-  const turn = shape.kind === "box" ? X : [1, 0, 0, 0, 1, 0, 0, 0, 1];
-  const signs = [-1, 1];
-  return signs.flatMap((x) =>
-    signs.flatMap((y) =>
-      signs.map((z) =>
-        plus(
-          plus(plus(X.slice(9), turn.slice(0, 3), x * half[0]), turn.slice(3, 6), y * half[1]),
-          turn.slice(6, 9),
-          z * half[2],
-        ),
-      ),
-    ),
-  );
+// The box about a shape, along its own axes: its lowest and its highest corner.
+function boxAbout({ kind, size, radius, length: long = 0, vertices }) {
+  if (kind === "mesh") return extent(triples(vertices));
+  const along = kind === "cylinder" ? long / 2 : radius + long / 2;
+  const high = kind === "box" ? size.map((v) => v / 2) : [radius, radius, along];
+  return { low: high.map((v) => -v), high };
 }
 
-// The frames of an arm, and the ends of its bodies along z.
-function endsOf({ bodies }, frames, shapes) {
-  const ends = bodies.flatMap(({ shape, pose, frame, stretches }) => {
-    const { length: long, size } = shapes[shape];
-    const half = stretches ? 0 : (long ?? size?.[2] ?? 0) / 2;
-    const X = compose(frames[frame], pose);
-    return [-half, half].map((z) => plus(X.slice(9), X.slice(6, 9), z));
-  });
-  return [...frames.map((X) => X.slice(9)), ...ends];
+// The corners of the box about a body, in the world.
+function boundsOf({ low, high }, X) {
+  const corners = [];
+  for (const x of [low[0], high[0]])
+    for (const y of [low[1], high[1]])
+      for (const z of [low[2], high[2]])
+        corners.push([0, 1, 2].map((k) => X[k] * x + X[3 + k] * y + X[6 + k] * z + X[9 + k]));
+  return corners;
+}
+
+// The frames of an arm, and the corners of its bodies; a rod is between frames.
+function cornersOfArm({ bodies }, frames, boxes) {
+  const corners = bodies.flatMap(({ shape, pose, frame, stretches }) =>
+    stretches ? [] : boundsOf(boxes[shape], compose(frames[frame], pose)),
+  );
+  return [...frames.map((X) => X.slice(9)), ...corners];
 }
 
 // Everything the arms, the parts and the frames ever touch, in points; and the size of it all. Of what stands, no more
@@ -111,9 +101,10 @@ function surveyed() {
   const points = [[0, 0, 0]];
   const animation = data.animation ?? { arms: {}, frames: [], parts: [], fixtures: [], shapes: [], t: [] };
   const skip = Math.max(1, Math.floor(animation.t.length / 60));
+  const boxes = animation.shapes.map(boxAbout);
   for (let i = 0; i < animation.t.length; i += skip)
     for (const figure of Object.values(animation.arms))
-      points.push(...endsOf(figure, framesOf(figure, [i, i, 0]), animation.shapes));
+      points.push(...cornersOfArm(figure, framesOf(figure, [i, i, 0]), boxes));
   for (const frame of animation.frames) {
     frame.poses.forEach((row, i) => {
       if (i >= frame.visible_from && i % skip === 0) points.push(row.slice(9));
@@ -121,14 +112,14 @@ function surveyed() {
   }
   for (const part of animation.parts)
     part.poses.forEach((X, i) => {
-      if (part.arms[i] === null) points.push(...boundsOf(animation.shapes[part.shape], X));
+      if (part.arms[i] === null) points.push(...boundsOf(boxes[part.shape], X));
     });
   const near = extent(points);
   const margin = points.length > 1 ? 0.4 * near.size : Infinity;
   const [least, most] = [near.low.map((v) => v - margin), near.high.map((v) => v + margin)];
   let floor = 0;
   for (const { shape, pose } of animation.fixtures)
-    for (const p of boundsOf(animation.shapes[shape], pose)) {
+    for (const p of boundsOf(boxes[shape], pose)) {
       points.push(p.map((v, k) => Math.min(Math.max(v, least[k]), most[k])));
       floor = Math.min(floor, p[2]);
     }

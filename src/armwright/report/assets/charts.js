@@ -12,12 +12,17 @@ const MARGIN = { left: 50, right: 10, top: 8, bottom: 20 };
 const SECONDS = { many: 1, name: "s", room: 55, rules: false };
 const MILLISECONDS = { many: 1000, name: "ms", room: 70, rules: true };
 let charts = [];
+// The times that are shown, from and to; null for all of them.
+let timeSpan = null;
+
+const shownTimes = () => timeSpan ?? [0, data.duration || 1];
 
 function axesOf({ span, powers = false, below = 0 }, width, height) {
   const [low, high] = span();
   const [x0, y0] = [MARGIN.left, MARGIN.top];
   const [w, h] = [width - x0 - MARGIN.right, height - y0 - MARGIN.bottom - below];
-  const lasts = data.duration || 1;
+  const [from, to] = shownTimes();
+  const lasts = to - from;
   const part = powers ? (v) => Math.log(high / v) / Math.log(high / low) : (v) => (high - v) / (high - low);
   return {
     low,
@@ -28,9 +33,9 @@ function axesOf({ span, powers = false, below = 0 }, width, height) {
     w,
     h,
     foot: y0 + h + below,
-    x: (t) => x0 + (t / lasts) * w,
+    x: (t) => x0 + ((t - from) / lasts) * w,
     y: (v) => y0 + Math.min(1.05, part(v)) * h,
-    t: (x) => ((x - x0) / w) * lasts,
+    t: (x) => from + ((x - x0) / w) * lasts,
   };
 }
 
@@ -71,13 +76,15 @@ function drawScales(ink, axes, unit) {
     rule(ink, x0, y, x0 + w, y, isZero ? colours.line : colours.faint);
     ink.fillText(text, x0 - 6, y + 4);
   }
-  const lasts = (data.duration || 1) * unit.many;
-  const step = roundStep(lasts, Math.max(2, w / unit.room));
+  const [from, to] = shownTimes().map((t) => t * unit.many);
+  const step = roundStep(to - from, Math.max(2, w / unit.room));
+  const first = Math.ceil(from / step - 1e-9);
   ink.textAlign = "center";
-  for (let t = 0; t <= lasts * 1.0001; t += step) {
-    const x = axes.x(t / unit.many);
+  for (let k = first; k * step <= to * 1.0001; k++) {
+    const x = axes.x((k * step) / unit.many);
     if (unit.rules) rule(ink, x, y0, x, foot, colours.faint);
-    ink.fillText(t ? number(t, decimalsOf(step)) : `0 ${unit.name}`, Math.min(x, x0 + w - 8), foot + 15);
+    const text = k ? number(k * step, decimalsOf(step)) : "0";
+    ink.fillText(k === first ? `${text} ${unit.name}` : text, Math.min(x, x0 + w - 8), foot + 15);
   }
 }
 
@@ -131,7 +138,12 @@ function drawCharts() {
 }
 
 function moveCursors() {
-  for (const { axes, cursor } of charts) if (axes) cursor.style.left = `${axes.x(now.t)}px`;
+  const [from, to] = shownTimes();
+  for (const { axes, cursor } of charts) {
+    if (!axes) continue;
+    cursor.style.left = `${axes.x(now.t)}px`;
+    cursor.hidden = now.t < from || now.t > to;
+  }
 }
 
 function swatch(i) {

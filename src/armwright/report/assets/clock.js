@@ -27,7 +27,7 @@ function onKey(event, step, leap) {
     event.ctrlKey ||
     event.altKey ||
     event.metaKey ||
-    target.matches("select") ||
+    target.matches("select, input[type=range]:not(#time)") ||
     (event.key === " " && target.matches("button"))
   )
     return;

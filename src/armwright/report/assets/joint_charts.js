@@ -1,6 +1,7 @@
 // Charts of joints: four quantities of one arm, either all joints in % of their limits or one joint in its units.
 
-const hidden = new Set();
+// Joints that are drawn in colour; empty for the one that comes nearest to its limit.
+const emphasised = new Set();
 let scale = "all"; // or the index of a joint
 
 const chosenArm = () => data.arms[now.arm];
@@ -53,23 +54,58 @@ function spanOf(quantity, curves) {
 
 function curvesOf(quantity) {
   const arm = chosenArm();
-  const chosen = arm.joints.map((_, j) => j).filter((j) => (scale === "all" ? !hidden.has(j) : j === scale));
+  const chosen = arm.joints.map((_, j) => j).filter((j) => scale === "all" || j === scale);
   return [false, true].flatMap((measured) =>
     rowsOf(quantity, arm, measured).rows ? chosen.map((j) => curveOf(quantity, arm, j, measured)) : [],
   );
 }
 
+// The joint that comes nearest to its limit in the times that are shown, and how near; null where none has a limit. Of
+// errors it is the largest.
+function nearestToLimit(quantity) {
+  const arm = chosenArm();
+  const [from, to] = shownTimes();
+  const { times, rows } = rowsOf(quantity, arm);
+  let most = null;
+  rows?.forEach((row, i) => {
+    if (times[i] < from || times[i] > to) return;
+    row.forEach((value, j) => {
+      const part = quantity === TRACKING ? value : share(quantity, arm.joints[j], value);
+      if (part !== null && Math.abs(part) > (most?.part ?? -1)) most = { j, part: Math.abs(part) };
+    });
+  });
+  return most;
+}
+
+// Whether a joint is drawn in colour.
+function inColour(j, nearest) {
+  if (scale !== "all" || (!emphasised.size && !nearest)) return true;
+  return emphasised.size ? emphasised.has(j) : j === nearest.j;
+}
+
 function drawBorders(ink, axes) {
   const stages = data.stages.filter((stage) => stage.arm === chosenArm().name);
-  for (const t of new Set(stages.flatMap((stage) => [stage.t0, stage.t1]))) {
+  const inside = (x) => x >= axes.x0 && x <= axes.x0 + axes.w;
+  let last = -Infinity;
+  for (const t of [...new Set(stages.flatMap((stage) => [stage.t0, stage.t1]))].sort((a, b) => a - b)) {
     const x = Math.round(axes.x(t)) + 0.5;
+    if (!inside(x) || x - last < 3) continue;
+    last = x;
     rule(ink, x, axes.y0, x, axes.y0 + axes.h, colours.line);
   }
   ink.fillStyle = colours.quiet;
   ink.textAlign = "center";
+  // A number that would touch the one before it, or has no room in its stage, is left out.
+  let end = axes.x0;
   data.stages.forEach((stage, i) => {
-    const [from, to] = [axes.x(stage.t0), axes.x(stage.t1)];
-    if (stage.arm === chosenArm().name && to - from > 16) ink.fillText(String(i + 1), (from + to) / 2, axes.y0 + 10);
+    if (stage.arm !== chosenArm().name) return;
+    const from = Math.max(axes.x0, axes.x(stage.t0));
+    const to = Math.min(axes.x0 + axes.w, axes.x(stage.t1));
+    const wide = ink.measureText(String(i + 1)).width;
+    const middle = (from + to) / 2;
+    if (to - from < wide + 4 || middle - wide / 2 < end + 3) return;
+    ink.fillText(String(i + 1), middle, axes.y0 + 10);
+    end = middle + wide / 2;
   });
 }
 
@@ -85,14 +121,15 @@ function worstText(arm, j) {
   return `${quantityText(TRACKING, arm.joints[j], worst[j])} at ${number(worst_t[j], 2)} s`;
 }
 
-function headOf(quantity) {
+function headOf(quantity, nearest) {
   if (quantity === TRACKING) {
     const arm = chosenArm();
     const units = [...new Set(arm.joints.map((joint) => TRACKING.units[joint.kind]))].join(", ");
     if (!arm.measured) return "";
     return scale === "all" ? units : `${TRACKING.units[arm.joints[scale].kind]} · largest ${worstText(arm, scale)}`;
   }
-  if (scale === "all") return "% of limit";
+  if (scale === "all" && !nearest) return "% of limit";
+  if (scale === "all") return `% of limit · ${chosenArm().joints[nearest.j].name} ${number(100 * nearest.part, 0)} %`;
   const joint = chosenArm().joints[scale];
   const limits = limitsOf(quantity, joint).map((limit) =>
     limit === null ? "none" : quantityText(quantity, joint, limit),
@@ -120,6 +157,7 @@ function tipLine(quantity, j, t) {
 
 function jointChart(quantity) {
   let curves = [];
+  let nearest = null;
   const head = make("span");
   return {
     quantity,
@@ -127,8 +165,10 @@ function jointChart(quantity) {
     heading: [quantity.title, head],
     unitOfTime: SECONDS,
     choose: () => {
-      curves = curvesOf(quantity);
-      head.textContent = headOf(quantity);
+      nearest = nearestToLimit(quantity);
+      // What is grey lies below.
+      curves = curvesOf(quantity).sort((a, b) => inColour(a.j, nearest) - inColour(b.j, nearest));
+      head.textContent = headOf(quantity, nearest);
     },
     span: () => spanOf(quantity, curves),
     paint: (ink, axes) => {
@@ -139,10 +179,12 @@ function jointChart(quantity) {
       curves.map(({ j, times, values, free, measured }) => ({
         times,
         values,
-        colour: colours.hues[j % HUES],
         dash: free && !measured ? [2, 3] : [],
+        ...(inColour(j, nearest)
+          ? { colour: colours.hues[j % HUES], width: scale === "all" ? 2 : 1.5 }
+          : { colour: colours.quiet, width: 1, alpha: 0.4 }),
         // Beside a measured curve the planned one is broad and pale, so that both are seen where they are one.
-        ...(chosenArm().measured?.[quantity.key] && !measured ? { width: 4.5, alpha: 0.35 } : {}),
+        ...(chosenArm().measured?.[quantity.key] && !measured && inColour(j, nearest) ? { width: 4.5, alpha: 0.35 } : {}),
       })),
     tipAt: (t) => {
       if (!chosenArm().t.length) return [];
@@ -167,10 +209,10 @@ function chooseCurves() {
 
 function makeLegend() {
   const buttons = chosenArm().joints.map((joint, j) => {
-    const button = make("button", { type: "button", ariaPressed: String(!hidden.has(j)) }, swatch(j), joint.name);
+    const button = make("button", { type: "button", ariaPressed: String(emphasised.has(j)) }, swatch(j), joint.name);
     button.addEventListener("click", () => {
-      hidden.delete(j) || hidden.add(j);
-      button.ariaPressed = String(!hidden.has(j));
+      emphasised.delete(j) || emphasised.add(j);
+      button.ariaPressed = String(emphasised.has(j));
       chooseCurves();
     });
     return button;
@@ -178,9 +220,16 @@ function makeLegend() {
   byId("legend").replaceChildren(...(scale === "all" ? buttons : []));
 }
 
+// Show a span of time in all charts, or all of it.
+function zoomTime(span) {
+  timeSpan = span && span[1] > span[0] ? span : null;
+  byId("whole").hidden = !timeSpan;
+  chooseCurves();
+}
+
 function chooseArmInCharts() {
   scale = "all";
-  hidden.clear();
+  emphasised.clear();
   byId("scale").replaceChildren(
     make("option", { value: "all", textContent: "all joints, % of limit" }),
     ...chosenArm().joints.map((joint, j) =>
@@ -201,6 +250,10 @@ function startJointCharts() {
     scale = event.target.value === "all" ? "all" : Number(event.target.value);
     makeLegend();
     chooseCurves();
+  });
+  byId("whole").addEventListener("click", () => zoomTime(null));
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && timeSpan) zoomTime(null);
   });
   chooseArmInCharts();
 }

@@ -4,6 +4,7 @@ let labels = [];
 let labelBoxes = [];
 const LABEL_FONT = "12px system-ui, sans-serif";
 const LABEL_HEIGHT = 15;
+const FAINT = 0.5;
 // Where a name may stand about its point: to the right, to the left, below, above, then farther away.
 const LABEL_PLACES = [0, 1, 2, 3].flatMap((far) => [
   [1, -1 - far],
@@ -11,6 +12,9 @@ const LABEL_PLACES = [0, 1, 2, 3].flatMap((far) => [
   [-1, -1 - far],
   [-1, 1 + far],
 ]);
+
+// So many names of one point are told, and others counted.
+const MOST_NAMES = 3;
 
 // Names of one point are joined.
 function joinedLabels() {
@@ -20,10 +24,15 @@ function joinedLabels() {
       (other) =>
         other.below === label.below &&
         other.quiet === label.quiet &&
+        other.hidden === label.hidden &&
         Math.hypot(other.p.x - label.p.x, other.p.y - label.p.y) < 9,
     );
-    if (near) near.text += `, ${label.text}`;
-    else joined.push({ ...label });
+    if (near) near.names.push(label.text);
+    else joined.push({ ...label, names: [label.text] });
+  }
+  for (const label of joined) {
+    const more = label.names.length - MOST_NAMES;
+    label.text = label.names.slice(0, MOST_NAMES).join(", ") + (more > 0 ? ` +${more}` : "");
   }
   return joined;
 }
@@ -45,7 +54,7 @@ function boxesOf({ p, below }, wide) {
 const overlap = (a, b) =>
   a.x < b.x + b.wide + 3 && b.x < a.x + a.wide + 3 && a.y < b.y + LABEL_HEIGHT && b.y < a.y + LABEL_HEIGHT;
 
-// A name for which there is no room is left out; the list of frames has it.
+// A name for which there is no room is left out; the list of frames has it. Names of what is hidden are faint.
 function paintLabels() {
   pen.font = LABEL_FONT;
   pen.textBaseline = "middle";
@@ -54,20 +63,25 @@ function paintLabels() {
   const taken = [{ x: 10, y: canvas.clientHeight - 18, wide: pen.measureText(scale).width }];
   pen.fillStyle = colours.quiet;
   pen.fillText(scale, taken[0].x, taken[0].y + 8);
-  for (const label of joinedLabels()) {
+  for (const label of labels) label.hidden = isHidden(label.p);
+  // What is in sight has the first choice of places.
+  for (const label of joinedLabels().sort((a, b) => a.hidden - b.hidden)) {
     const box = boxesOf(label, pen.measureText(label.text).width).find(
       (one) => !taken.some((other) => overlap(one, other)),
     );
     if (!box) continue;
     taken.push(box);
     const [x, y] = [box.x, box.y + LABEL_HEIGHT / 2];
+    const alpha = label.hidden ? FAINT : 1;
     if (box.far)
-      stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7);
+      stroke(label.p, { ...label.p, x: label.p.x < x ? x - 2 : x + box.wide + 2, y }, colours.quiet, 0.8, 0.7 * alpha);
+    pen.globalAlpha = alpha;
     pen.lineWidth = 3.5;
     pen.strokeStyle = colours.sky;
     pen.strokeText(label.text, x, y);
     pen.fillStyle = label.quiet ? colours.quiet : colours.ink;
     pen.fillText(label.text, x, y);
+    pen.globalAlpha = 1;
   }
   pen.textBaseline = "alphabetic";
   labelBoxes = taken;

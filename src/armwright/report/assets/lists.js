@@ -1,4 +1,4 @@
-// Lists that follow the time: program, what happened, stages, the tree of frames.
+// Lists that follow the time: program, what happened, the tree of frames.
 
 // Comments of a program are { ... } over any number of lines, and // to the end of one; those of a file of poses # to
 // the end of a line.
@@ -61,21 +61,49 @@ function showLine(number) {
   if (row?.classList.contains("can")) row.click();
 }
 
-let shownEffect = null;
+// Effects of one process each, in order.
+const processes = [...new Set(data.effects.map((effect) => effect.process))];
+
+// The present effect of every process that does something now, and the one that was chosen by hand or begun last.
+function presentEffects() {
+  const latest = presentEffect();
+  return processes.flatMap((process) => {
+    if (data.effects[latest]?.process === process) return [latest];
+    const present = data.effects.findLastIndex((one) => one.process === process && one.t0 <= now.t + HAIR);
+    return present >= 0 && data.effects[present].t1 >= now.t - HAIR ? [present] : [];
+  });
+}
+
+// The colour of the arm of an effect, or of the one that its process moved last.
+function effectColour(present) {
+  const { process } = data.effects[present];
+  const of = data.effects.slice(0, present + 1).findLast((effect) => effect.arm && effect.process === process);
+  const arm = data.arms.findIndex((one) => one.name === of?.arm);
+  return arm < 0 ? "var(--accent)" : `var(--arm${arm % colours.arms.length})`;
+}
+
+let shownEffects = null;
 
 function showProgram() {
-  const present = presentEffect();
-  if (present === shownEffect) return;
-  shownEffect = present;
-  const line = data.effects[present]?.line;
-  const done = new Set(data.effects.slice(0, present + 1).map((effect) => effect.line));
-  [...byId("program").children].forEach((row, i) => {
+  const present = presentEffects();
+  const key = `${presentEffect()}: ${present}`;
+  if (key === shownEffects) return;
+  shownEffects = key;
+  const latest = presentEffect();
+  const done = new Set(data.effects.slice(0, latest + 1).map((effect) => effect.line));
+  const lines = byId("program").children;
+  [...lines].forEach((row, i) => {
     row.classList.toggle("done", done.has(i + 1));
-    row.classList.toggle("now", i + 1 === line);
+    // Processes that are at the same line have a stripe each.
+    const stripes = present.filter((k) => data.effects[k].line === i + 1).map(effectColour);
+    row.classList.toggle("now", stripes.length > 0);
+    row.style.boxShadow = stripes.map((colour, k) => `inset ${4 * (k + 1)}px 0 ${colour}`).join(", ");
   });
-  [...byId("trace").children].forEach((row, i) => row.firstChild.classList.toggle("now", i === present));
-  keepInSight(byId("program"), byId("program").children[line - 1]);
-  keepInSight(byId("trace"), byId("trace").children[present]);
+  [...byId("trace").children].forEach((row, i) => {
+    row.firstChild.classList.toggle("now", present.includes(i));
+  });
+  keepInSight(byId("program"), lines[data.effects[latest]?.line - 1]);
+  keepInSight(byId("trace"), byId("trace").children[latest]);
 }
 
 // When something was done: its start, and its end where it took time.
@@ -85,7 +113,7 @@ function timesOf(effect) {
 }
 
 // Which process a line belongs to, in words and in a colour of its own.
-function processTag(process, processes) {
+function processTag(process) {
   const tag = make("span", { className: "process", textContent: process });
   tag.style.setProperty("--hue", `var(${hue(processes.indexOf(process))})`);
   return tag;
@@ -93,7 +121,6 @@ function processTag(process, processes) {
 
 function fillTrace() {
   byId("trace-card").hidden = !data.effects.length;
-  const processes = [...new Set(data.effects.map((effect) => effect.process))];
   byId("trace").classList.toggle("processes", processes.length > 1);
   byId("trace").append(
     ...data.effects.map((effect, i) => {
@@ -101,106 +128,13 @@ function fillTrace() {
         "button",
         { type: "button" },
         make("time", { textContent: timesOf(effect) }),
-        ...(processes.length > 1 ? [processTag(effect.process, processes)] : []),
+        ...(processes.length > 1 ? [processTag(effect.process)] : []),
         make("span", { className: "text", textContent: effect.text }),
       );
       row.addEventListener("click", () => seek(effect.t0, i));
       return make("li", {}, row);
     }),
   );
-}
-
-// The largest share of a limit over the joints: bar, percentage, and the rest on hovering.
-function peakCell(stage, peaks, quantity) {
-  const arm = data.arms.find((one) => one.name === stage.arm);
-  const shares = (peaks ?? []).map((peak, j) =>
-    arm.joints[j][quantity.limit] === null || peak === null ? null : peak / arm.joints[j][quantity.limit],
-  );
-  const worst = Math.max(...shares.map((part) => part ?? -1));
-  if (!shares.length || worst < 0) return make("td", { textContent: "–", className: "quiet" });
-  const fill = make("i");
-  fill.style.width = `${Math.min(100, 100 * worst)}%`;
-  const each = shares.map(
-    (part, j) =>
-      `${arm.joints[j].name}: ${part === null ? "no limit" : `${number(100 * part, 1)} %`} (${quantityText(quantity, arm.joints[j], peaks[j])})`,
-  );
-  return make(
-    "td",
-    { className: worst > 1 + HAIR ? "over" : "", title: each.join("\n") },
-    make("span", { className: "bar" }, fill),
-    `${number(100 * worst, 0)} %`,
-  );
-}
-
-// How near other bodies came: the distance, both names, and when; a click goes there.
-function clearanceCell({ clearance }) {
-  if (!clearance) return make("td", { textContent: "–", className: "quiet" });
-  const { distance, bound, bodies, t } = clearance;
-  if (distance === null) return make("td", { textContent: `above ${number(bound * MILLIMETRES, 0)} mm` });
-  const link = make("button", { type: "button", textContent: `${number(distance * MILLIMETRES, 1)} mm` });
-  link.addEventListener("click", (event) => {
-    event.stopPropagation();
-    seek(t);
-  });
-  const said = make("span", { className: "quiet", textContent: `${bodies.join(" – ")}, ${number(t, 2)}\u00a0s` });
-  return make("td", { className: distance < data.clearance || distance <= 0 ? "over near" : "near" }, link, said);
-}
-
-function stageRow(stage, i) {
-  const swatch = make("span", { className: "swatch" });
-  swatch.style.setProperty("--hue", `var(${hue(i)})`);
-  const button = make("button", { type: "button" }, swatch, `${i + 1} ${stage.kind}`);
-  const numeric = (text) => make("td", { className: "number", textContent: text });
-  const millimetres = (value) => (value === null ? "–" : number(value * MILLIMETRES, value * MILLIMETRES < 10 ? 2 : 1));
-  const row = make(
-    "tr",
-    {},
-    make("td", {}, button),
-    make("td", { textContent: stage.to.join(", ") }),
-    make("td", { textContent: stage.arm }),
-    numeric(stage.line),
-    numeric(number(stage.t0, 2)),
-    numeric(number(stage.t1 - stage.t0, 2)),
-    numeric(millimetres(stage.hand_length)),
-    numeric(millimetres(stage.deviation)),
-    peakCell(stage, stage.peak_speed, QUANTITIES[1]),
-    peakCell(stage, stage.peak_effort, QUANTITIES[3]),
-    ...(hasClearances ? [clearanceCell(stage)] : []),
-    make("td", { textContent: stage.note }),
-  );
-  row.addEventListener("click", () => {
-    if (chosenArm().name !== stage.arm) chooseArm(data.arms.findIndex((arm) => arm.name === stage.arm));
-    seek(stage.t0);
-  });
-  return row;
-}
-
-function stripMark(stage, i) {
-  const mark = make("i");
-  const arm = data.arms.findIndex((one) => one.name === stage.arm);
-  const part = 100 / Math.max(data.arms.length, 1);
-  Object.assign(mark.style, {
-    left: `${(100 * stage.t0) / data.duration}%`,
-    width: `${(100 * (stage.t1 - stage.t0)) / data.duration}%`,
-    top: `${arm * part}%`,
-    height: `${part}%`,
-  });
-  mark.style.setProperty("--hue", `var(${hue(i)})`);
-  return mark;
-}
-
-const hasClearances = data.stages.some((stage) => stage.clearance);
-
-function fillStages() {
-  byId("clearance-head").hidden = !hasClearances;
-  byId("stages-card").hidden = !data.stages.length;
-  byId("stages").append(...data.stages.map(stageRow));
-  if (data.duration > 0) byId("strip").append(...data.stages.map(stripMark));
-}
-
-function showStages() {
-  const present = new Set(data.arms.map((arm) => stageAt(arm.name, now.t)));
-  [...byId("stages").children].forEach((row, i) => row.classList.toggle("now", present.has(i)));
 }
 
 const tree = { changes: data.animation?.tree ?? [], applied: -1, places: new Map() };
@@ -243,6 +177,6 @@ function showTree() {
   }
   for (const [name, figure] of Object.entries(data.animation.arms)) {
     const place = tree.places.get(name);
-    if (place) place.textContent = placeText(framesOf(figure, at).at(-1).slice(9));
+    if (place) place.textContent = placeText(framesAt(figure, positionsOf(name, figure, at)).at(-1).slice(9));
   }
 }

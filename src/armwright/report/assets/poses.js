@@ -21,9 +21,8 @@ function change({ frame, slide, stretches }, figure, q, place) {
   return X;
 }
 
-// The frames 0 to n of an arm, and last its tool, in the world, at measured or planned joint positions.
-function framesOf(figure, place, positions = figure.q) {
-  const q = blend(positions, place);
+// The frames 0 to n of an arm, and last its tool, in the world, at joint positions.
+function framesAt(figure, q) {
   const frames = [figure.base];
   figure.joints.forEach((joint, i) => {
     const [turn, shift] = joint.revolute ? [q[i], 0] : [0, q[i]];
@@ -31,6 +30,16 @@ function framesOf(figure, place, positions = figure.q) {
   });
   frames.push(compose(frames.at(-1), figure.tool));
   return frames;
+}
+
+// The same at an instant, at measured or planned joint positions.
+function framesOf(figure, place, positions = figure.q) {
+  return framesAt(figure, blend(positions, place));
+}
+
+// Where the joints of an arm are: as they were set by hand, or as they were at the instant.
+function positionsOf(name, figure, place) {
+  return now.jog?.[name] ?? blend(figure.q, place);
 }
 
 function gripOf(figure, [i, j, s]) {
@@ -47,7 +56,10 @@ function partPose({ times, poses, changes_evenly }, last, t) {
 function bodiesAt(t) {
   const { animation } = data;
   const place = locate(animation.t, t);
-  const arms = Object.entries(animation.arms).map(([name, figure]) => [name, figure, framesOf(figure, place)]);
+  const arms = Object.entries(animation.arms).map(([name, figure]) => {
+    const q = positionsOf(name, figure, place);
+    return [name, figure, framesAt(figure, q), q];
+  });
   const tools = Object.fromEntries(arms.map(([name, _, frames]) => [name, frames.at(-1)]));
   const bodies = animation.fixtures.map(({ name, shape, pose }) => ({ name, shape, pose, tint: "fixture", whose: 0 }));
   animation.parts.forEach((part, whose) => {
@@ -59,8 +71,7 @@ function bodiesAt(t) {
     const pose = arm === null ? partPose(part, last, t) : compose(tools[arm], part.poses[last]);
     bodies.push({ name: part.name, shape: part.shape, pose, tint: "part", whose, arm });
   });
-  arms.forEach(([_, figure, frames], whose) => {
-    const q = blend(figure.q, place);
+  arms.forEach(([_, figure, frames, q], whose) => {
     for (const body of figure.bodies) {
       const { name, shape, tint } = body;
       const pose = compose(compose(frames[body.frame], change(body, figure, q, place)), body.pose);

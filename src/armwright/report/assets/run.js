@@ -1,4 +1,4 @@
-// The page of a run: messages, readouts and the choice of an arm.
+// The page of a run: messages, the clock and the choice of an arm.
 
 const PACES = [
   [0.25, "¼×"],
@@ -23,54 +23,26 @@ function messageItem(message) {
   return item;
 }
 
-function jointRow(joint) {
-  const [low, high] = [joint.lower, joint.upper];
-  const range = make(
-    "span",
-    { className: low === null || high === null ? "range none" : "range", title: "" },
-    make("i"),
-  );
-  if (low !== null && high !== null)
-    range.title = `${quantityText(QUANTITIES[0], joint, low)} to ${quantityText(QUANTITIES[0], joint, high)}`;
-  else range.firstChild.hidden = true;
-  return make(
-    "div",
-    { className: "joint" },
-    make("span", { className: "name", textContent: joint.name, title: joint.name }),
-    make("span", { className: "value" }),
-    range,
-  );
+// Messages that are shown at once; a button after them shows the others.
+const FIRST_MESSAGES = 2;
+
+function fillMessages() {
+  const items = data.messages.map(messageItem);
+  const rest = items.slice(FIRST_MESSAGES);
+  byId("messages").append(...items);
+  if (!rest.length) return;
+  for (const item of rest) item.classList.add("folded");
+  const more = make("button", { type: "button", textContent: `${rest.length} more` });
+  more.className = "more";
+  more.addEventListener("click", () => {
+    for (const item of rest) item.classList.remove("folded");
+    more.remove();
+  });
+  items[FIRST_MESSAGES - 1].append(more);
 }
 
 function presentRow(arm) {
   return arm.t.length ? locate(arm.t, now.t) : null;
-}
-
-function showReadout() {
-  const arm = chosenArm();
-  const place = arm && presentRow(arm);
-  if (!place) return;
-  // What is measured is drawn, and so it is what is told.
-  const q = arm.measured ? blend(arm.measured.q, locate(arm.measured.t, now.t)) : blend(arm.q, place);
-  [...byId("joints").children].forEach((row, j) => {
-    row.children[1].textContent = quantityText(QUANTITIES[0], arm.joints[j], q[j]);
-    const part = share(QUANTITIES[0], arm.joints[j], q[j]);
-    if (part !== null) row.children[2].firstChild.style.left = `${Math.min(100, Math.max(0, 50 + 50 * part))}%`;
-  });
-  const figure = data.animation?.arms[arm.name];
-  const instant = figure && locate(data.animation.t, now.t);
-  const hand = arm.measured && figure ? framesOf(figure, instant).at(-1).slice(9) : blend(arm.hand, place);
-  const parts = [["hand", `${placeText(hand)} mm`]];
-  if (figure) parts.push(["gripper", gripText(gripOf(figure, instant), arm.measured && figure.opening)]);
-  byId("hand").replaceChildren(
-    ...parts.map(([name, text]) => make("div", {}, make("span", { textContent: name }), text)),
-  );
-}
-
-// Fingers whose opening [m] was measured, or is known to be a share of the largest.
-function gripText(grip, opening) {
-  if (opening) return `${number(grip * opening * MILLIMETRES, 1)} mm open`;
-  return grip > 0.99 ? "open" : grip < 0.01 ? "closed" : `${number(100 * grip, 0)} % open`;
 }
 
 function showClock() {
@@ -93,8 +65,8 @@ function chooseArm(i) {
     [...group.children].forEach((button, k) => {
       button.ariaPressed = String(k === i);
     });
-  byId("joints").replaceChildren(...arm.joints.map(jointRow));
-  byId("readout-name").textContent = `Joints of ${arm.name}${arm.measured ? ", measured" : ""}`;
+  byId("readout-name").textContent = `Joints of ${arm.name}`;
+  fillJoints(arm);
   chooseArmInCharts();
   changed();
 }
@@ -115,6 +87,21 @@ function fillArms() {
   if (data.arms.length) chooseArm(0);
 }
 
+function startDrawer() {
+  byId("drawer").addEventListener("click", () => {
+    const open = byId("beside").hidden;
+    byId("beside").hidden = !open;
+    byId("drawer").ariaPressed = String(open);
+    document.querySelector("main").classList.toggle("alone", !open);
+  });
+}
+
+// The view is as high as the first screen leaves room for.
+function fitStage() {
+  const top = canvas.getBoundingClientRect().top + window.scrollY;
+  document.body.style.setProperty("--room", `${window.innerHeight - top - byId("dock").offsetHeight - 28}px`);
+}
+
 function redraw() {
   readColours();
   drawView();
@@ -122,13 +109,17 @@ function redraw() {
 }
 
 function start() {
-  byId("messages").append(...data.messages.map(messageItem));
+  fillMessages();
   fillProgram();
   fillTrace();
   fillStages();
   fillPictures();
+  fitStage();
   byId("tree-card").hidden = !tree.changes.length;
-  startView();
+  startView({ scrolls: true });
+  startDrawer();
+  window.addEventListener("resize", fitStage);
+  startJog();
   startJointCharts();
   listeners.push(showClock, showProgram, showStages, showPictures, showReadout, drawView);
   if (tree.changes.length) listeners.push(showTree);
@@ -148,6 +139,7 @@ function start() {
 window.armwright = {
   seek,
   bodies: () => bodiesAt(now.t).bodies,
+  drawnBy: () => (graphics ? "processor" : "painter"),
   labels: () => labelBoxes.map(({ x, y, wide }) => ({ x, y, wide, high: LABEL_HEIGHT })),
   state: () => {
     const arm = chosenArm();
@@ -156,8 +148,10 @@ window.armwright = {
       time: now.t,
       playing: now.playing,
       arm: arm?.name ?? null,
-      q: place ? blend(arm.q, place) : [],
+      q: place ? (now.jog?.[arm.name] ?? blend(arm.q, place)) : [],
       hand: place ? blend(arm.hand, place) : null,
+      tool: place && data.animation ? toolOf(arm, data.animation.arms[arm.name]) : null,
+      jog: Boolean(now.jog),
       line: data.effects[presentEffect()]?.line ?? null,
       stage: arm ? stageAt(arm.name, now.t) : -1,
     };

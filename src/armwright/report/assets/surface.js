@@ -1,14 +1,16 @@
 // Triangles with a depth at every pixel: what is nearer hides what is farther. Pixels are finer than those of the screen,
-// so that edges come out smooth.
+// so that edges come out smooth; where the graphics processor draws they are coarse and tell only what is hidden.
 
 // Pixels at most, and per pixel of the page along either side.
 const MOST_PIXELS = 1.6e6;
 const FINEST = 2;
+const COARSE = 0.5;
 const SHADES = 256;
 const surface = { canvas: document.createElement("canvas"), wide: 0, high: 0, ratio: 1 };
 
 function sizeSurface(width, height) {
-  const ratio = Math.min(FINEST * (window.devicePixelRatio || 1), Math.sqrt(MOST_PIXELS / (width * height)));
+  const finest = graphics ? COARSE : FINEST * (window.devicePixelRatio || 1);
+  const ratio = Math.min(finest, Math.sqrt(MOST_PIXELS / (width * height)));
   const [wide, high] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
   if (surface.wide !== wide || surface.high !== high) {
     Object.assign(surface.canvas, { width: wide, height: high });
@@ -208,10 +210,15 @@ function cornersOf({ corners }, X) {
   return placed;
 }
 
-// The light comes from above the reader's left shoulder. `corners` are those of the mesh in the world.
+// The light comes from above the reader's left shoulder.
+function lightOf() {
+  return unit(plus(plus(plus([0, 0, 0.5], lens.right, -0.45), lens.up, 0.55), lens.forward, -0.75));
+}
+
+// `corners` are those of the mesh in the world.
 function paintMesh({ normals, faces }, corners, X, colour, owner) {
   Object.assign(brush, { ramp: rampOf(colour), owner });
-  const light = unit(plus(plus(plus([0, 0, 0.5], lens.right, -0.45), lens.up, 0.55), lens.forward, -0.75));
+  const light = lightOf();
   const [n, o, a] = [0, 3, 6].map((c) => dot(light, X.slice(c, c + 3)));
   for (let i = 0; 3 * i < corners.length; i++) {
     const bright = normals[3 * i] * n + normals[3 * i + 1] * o + normals[3 * i + 2] * a;

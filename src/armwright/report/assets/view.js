@@ -18,7 +18,8 @@ function coloredPath(arm) {
   return pieces;
 }
 
-let plannedShown = true;
+// What can be left out of the view.
+const layers = { planned: true, frames: true, paths: true, labels: true };
 
 const paths = data.arms.map(coloredPath);
 
@@ -63,16 +64,18 @@ function paintBodies(bodies, tops) {
 }
 
 function paintSolids(bodies, width, height) {
-  const tops = topsOfBoxes();
   const stands = ({ tint }) => tint === "fixture";
   sizeSurface(width, height);
-  const key = JSON.stringify([camera, surface.wide, surface.high, colours.fixture, colours.quiet]);
-  paintStanding(key, () => paintBodies(bodies.filter(stands), tops));
+  const key = JSON.stringify([camera, surface.wide, surface.high, colours.fixture, colours.quiet, Boolean(graphics)]);
+  // Shadows hide nothing.
+  const lit = graphics ? [] : topsOfBoxes();
+  paintStanding(key, () => paintBodies(bodies.filter(stands), lit));
   paintBodies(
     bodies.filter((body) => !stands(body)),
-    tops,
+    lit,
   );
-  showSurface(width, height);
+  if (graphics) drawGraphics(bodies, width, height);
+  else showSurface(width, height);
 }
 
 function stroke(a, b, colour, width, alpha = 1) {
@@ -134,6 +137,31 @@ function paintPlanned(figure, frames, place) {
   });
 }
 
+// The plane of contact of the cell, as a pane with its height.
+function paintPlane(height) {
+  const margin = 0.06 * scenery.size;
+  const [[x0, y0], [x1, y1]] = [scenery.low.map((v) => v - margin), scenery.high.map((v) => v + margin)];
+  const corners = [
+    [x0, y0],
+    [x1, y0],
+    [x1, y1],
+    [x0, y1],
+  ].map(([x, y]) => project([x, y, height]));
+  if (corners.some(({ depth }) => depth < 0.03 * camera.distance)) return;
+  pen.beginPath();
+  for (const { x, y } of corners) pen.lineTo(x, y);
+  pen.closePath();
+  pen.fillStyle = pen.strokeStyle = colours.accent;
+  pen.lineWidth = 1.2;
+  pen.globalAlpha = 0.1;
+  pen.fill();
+  pen.globalAlpha = 0.6;
+  pen.stroke();
+  pen.globalAlpha = 1;
+  const inside = corners.find(({ x, y }) => x > 0 && y > 0 && x < canvas.clientWidth && y < canvas.clientHeight);
+  labels.push({ p: inside ?? corners[0], text: `contact at z = ${number(height * MILLIMETRES, 1)} mm`, quiet: true });
+}
+
 function paintFloor() {
   const step = roundStep(scenery.size, 9);
   const [low, high] = [
@@ -193,19 +221,25 @@ function drawView() {
   if (!data.animation || !canvas.clientWidth) return;
   let width, height;
   [pen, width, height] = sharpen(canvas);
+  pen.lineCap = "butt";
   lens = aim(width, height);
   labels = [];
   const { place, bodies, arms } = bodiesAt(now.t);
   paintFloor();
+  const { contact_plane } = data.animation;
+  if (contact_plane !== null && contact_plane !== undefined) paintPlane(contact_plane);
   paintSolids(bodies, width, height);
   paintWorldAxes();
-  paths.forEach((pieces, i) => {
-    paintPath(pieces, i === now.arm);
-  });
-  paintFrames(place);
-  if (plannedShown) for (const [_, figure, frames] of arms) if (figure.planned) paintPlanned(figure, frames, place);
+  if (layers.paths)
+    paths.forEach((pieces, i) => {
+      paintPath(pieces, i === now.arm);
+    });
+  if (layers.frames) paintFrames(place);
+  if (layers.planned && !now.jog)
+    for (const [_, figure, frames] of arms) if (figure.planned) paintPlanned(figure, frames, place);
   for (const [_, __, frames] of arms) paintHand(frames.at(-1).slice(9));
   nameBodies(bodies, arms);
+  if (!layers.labels) labels = [];
   paintLabels();
 }
 
@@ -215,47 +249,79 @@ function look(name) {
   drawView();
 }
 
-// A button for the planned arm, where the view draws a measured one.
-function startPlanned() {
-  const button = document.getElementById("planned");
-  // Live views have none.
-  if (!button) return;
+// Buttons for what can be left out; planned arms only where the view draws measured ones.
+function startLayers() {
   const measured = Object.values(data.animation?.arms ?? {}).some((figure) => figure.planned);
-  document.getElementById("planned-choice").hidden = !measured;
-  button.addEventListener("click", () => {
-    plannedShown = !plannedShown;
-    button.ariaPressed = String(plannedShown);
-    drawView();
-  });
+  for (const button of document.querySelectorAll("[data-layer]")) {
+    const { layer } = button.dataset;
+    button.hidden = layer === "planned" && !measured;
+    button.addEventListener("click", () => {
+      layers[layer] = !layers[layer];
+      button.ariaPressed = String(layers[layer]);
+      drawView();
+    });
+  }
 }
 
-function startView() {
-  const fingers = new Map();
+// What moves the view: one finger or the mouse turns it, with Shift it is shifted; two fingers turn and zoom it.
+function turnBy(fingers, event) {
   const spread = () => {
     const [a, b] = [...fingers.values()];
     return Math.hypot(a[0] - b[0], a[1] - b[1]) || 1;
   };
+  const last = fingers.get(event.pointerId);
+  const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
+  const before = fingers.size === 2 ? spread() : 1;
+  fingers.set(event.pointerId, [event.clientX, event.clientY]);
+  if (fingers.size === 2) {
+    zoom(before / spread());
+    orbit(dx / 2, dy / 2);
+  } else if (event.shiftKey || event.buttons === 2) shift(dx, dy);
+  else orbit(dx, dy);
+}
+
+let hintTimer = 0;
+
+function hint(text) {
+  const element = byId("view-hint");
+  element.textContent = text;
+  element.classList.add("shown");
+  clearTimeout(hintTimer);
+  hintTimer = setTimeout(() => element.classList.remove("shown"), 1200);
+}
+
+// On a page that `scrolls` one finger and the wheel scroll the page, two fingers and the wheel with Ctrl change the view.
+function startView({ scrolls = false } = {}) {
+  const fingers = new Map();
+  canvas.classList.toggle("scrolls", scrolls);
   canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
+    if (!scrolls || event.pointerType !== "touch") canvas.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
   });
   canvas.addEventListener("pointermove", (event) => {
-    const last = fingers.get(event.pointerId);
-    if (!last) return;
-    const [dx, dy] = [event.clientX - last[0], event.clientY - last[1]];
-    const before = fingers.size === 2 ? spread() : 1;
-    fingers.set(event.pointerId, [event.clientX, event.clientY]);
-    if (fingers.size === 2) zoom(before / spread());
-    else if (event.shiftKey || event.buttons === 2) shift(dx, dy);
-    else orbit(dx, dy);
+    if (!fingers.has(event.pointerId)) return;
+    if (scrolls && event.pointerType === "touch" && fingers.size < 2) return hint("Two fingers turn and zoom the view");
+    turnBy(fingers, event);
     drawView();
   });
   for (const end of ["pointerup", "pointercancel"])
-    canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+    canvas.addEventListener(end, (event) => {
+      fingers.delete(event.pointerId);
+    });
+  if (scrolls)
+    for (const touch of ["touchstart", "touchmove"])
+      canvas.addEventListener(
+        touch,
+        (event) => {
+          if (event.touches.length > 1) event.preventDefault();
+        },
+        { passive: false },
+      );
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   canvas.addEventListener(
     "wheel",
     (event) => {
+      if (scrolls && !event.ctrlKey && !event.metaKey) return hint("Ctrl and the wheel zoom the view");
       event.preventDefault();
       zoom(Math.exp(event.deltaY * 0.0012));
       drawView();
@@ -264,7 +330,7 @@ function startView() {
   );
   for (const button of document.querySelectorAll("[data-camera]"))
     button.addEventListener("click", () => look(button.dataset.camera));
-  startPlanned();
+  startLayers();
   document.getElementById("view-empty").hidden = Boolean(data.animation);
   if (data.animation) fit();
 }

@@ -1,0 +1,142 @@
+"""The numbers that stand above a run: how long it took, and how near it came to what limits it."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import attrs
+
+if TYPE_CHECKING:
+    from armwright.report.page import ArmRecord, RunPage, StageRow
+
+_SHORT = {"position": "pos", "speed": "speed", "acceleration": "acc", "effort": "effort"}
+# Limits that are named; others are counted.
+_NAMED = 2
+# Rounding beyond a limit is none.
+_TOLERANCE = 1e-6
+
+
+@attrs.frozen
+class Figure:
+    """A number with its name.
+
+    Attributes:
+        value: with its unit.
+        label: what it is.
+        title: more about it.
+        mark: ``warn`` or ``bad`` where it needs attention, else empty.
+    """
+
+    value: str
+    label: str
+    title: str = ""
+    mark: str = ""
+
+
+def headline_list(figures: Iterable[Figure]) -> str:
+    """Return figures as the HTML text of a list."""
+
+    def item(figure: Figure) -> str:
+        title = f' title="{html.escape(figure.title)}"' if figure.title else ""
+        name = f"figure {figure.mark}".strip()
+        value, label = html.escape(figure.value), html.escape(figure.label)
+        return f'<li class="{name}"{title}><b>{value}</b><small>{label}</small></li>'
+
+    return f'<ul class="headline" aria-label="In short">{"".join(map(item, figures))}</ul>'
+
+
+def headline(data: RunPage) -> Iterator[Figure]:
+    """Yield the numbers of a run that are known.
+
+    Args:
+        data: of its page.
+    """
+    finished = data.status == "finished"
+    yield Figure(f"{data.duration:.2f} s", "cycle time" if finished else "until the failure", data.status)
+    arms = {arm.name: arm for arm in data.arms}
+    yield from _peak_effort(data, arms)
+    yield from _tracking(data)
+    yield from _deviation(data)
+    yield from _distance(data)
+    if data.arms:
+        yield _limits(data)
+
+
+def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Figure]:
+    shares = [
+        (effort / joint.effort, stage, joint.name)
+        for stage in data.stages
+        if stage.peak_effort is not None and stage.arm in arms
+        for effort, joint in zip(stage.peak_effort, arms[stage.arm].joints, strict=True)
+        if 0 < joint.effort < float("inf")
+    ]
+    if shares:
+        share, stage, joint = max(shares, key=lambda one: one[0])
+        label = f"peak effort, {_of(data, stage)}{joint}"
+        yield Figure(f"{share:.0%}".replace("%", " %"), label, _during(stage), "bad" if share > 1 + _TOLERANCE else "")
+
+
+def _tracking(data: RunPage) -> Iterator[Figure]:
+    """Yield the largest tracking error of revolute joints."""
+    worst = [
+        (float(arm.measured.worst[j]), float(arm.measured.worst_t[j]), arm.name, joint.name)
+        for arm in data.arms
+        if arm.measured is not None
+        for j, joint in enumerate(arm.joints)
+        if joint.kind == "revolute"
+    ]
+    if worst:
+        error, t, arm, joint = max(worst)
+        yield Figure(f"{error * 1e3:.2f} mrad", f"largest tracking error, {joint}", f"{arm} at {t:.2f} s")
+
+
+def _deviation(data: RunPage) -> Iterator[Figure]:
+    """Yield the largest deviation from a line; from paths past frames, whose corners are rounded, only without one."""
+    known = [(stage.deviation, i) for i, stage in enumerate(data.stages) if stage.deviation is not None]
+    stages = [one for one in known if data.stages[one[1]].kind in {"LINE", "HAND"}] or known
+    if stages:
+        deviation, i = max(stages)
+        yield Figure(f"{deviation * 1e3:.2f} mm", "largest path deviation", _during(data.stages[i]))
+
+
+def _distance(data: RunPage) -> Iterator[Figure]:
+    near = [(one.distance, i) for i, stage in enumerate(data.stages) if (one := stage.clearance) and one.distance]
+    near += [(0.0, i) for i, stage in enumerate(data.stages) if (one := stage.clearance) and one.distance == 0]
+    if near:
+        distance, i = min(near)
+        clearance = data.stages[i].clearance
+        assert clearance is not None  # noqa: S101 - it has a distance
+        mark = "warn" if distance < data.clearance or distance <= 0 else ""
+        bodies = " – ".join(clearance.bodies)
+        yield Figure(f"{distance * 1e3:.1f} mm", "least distance", f"{bodies}, at {clearance.t:.2f} s", mark)
+        return
+    bounds = [stage.clearance.bound for stage in data.stages if stage.clearance is not None]
+    if bounds:
+        yield Figure(f"> {min(bounds) * 1e3:.0f} mm", "least distance")
+
+
+def _limits(data: RunPage) -> Figure:
+    """Return which limits joints reach, and of which joints."""
+    several = len(data.arms) > 1
+    shares: dict[str, float] = {}
+    for arm in data.arms:
+        for span in arm.at_limits:
+            name = f"{arm.name + ' ' if several else ''}{_SHORT[span.limit]} j{span.joint + 1}"
+            shares[name] = max(span.share, shares.get(name, 0.0))
+    beyond = [name for name, share in shares.items() if share > 1 + _TOLERANCE]
+    names = beyond or list(shares)
+    if not names:
+        return Figure("none", "limits reached")
+    shown = ", ".join(names) if len(names) <= _NAMED else f"{len(names)}"
+    title = ", ".join(f"{name} {shares[name]:.0%}" for name in names)
+    return Figure(shown, "limits exceeded" if beyond else "limits reached", title, "bad" if beyond else "warn")
+
+
+def _of(data: RunPage, stage: StageRow) -> str:
+    return f"{stage.arm} " if len(data.arms) > 1 else ""
+
+
+def _during(stage: StageRow) -> str:
+    return f"{stage.kind} to {', '.join(stage.to)}, {stage.t0:.2f} to {stage.t1:.2f} s"
