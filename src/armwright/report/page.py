@@ -303,7 +303,7 @@ def run_page(data: RunPage) -> str:
         badge=badge(data.status, good=data.status == "finished"),
         facts=facts(_facts(data)),
         main=Template(asset("run.html")).substitute(headline=headline_list(headline(data))),
-        styles=("run.css",),
+        styles=("view.css", "run.css"),
         scripts=_SCRIPTS,
         data=data,
         generated=f"{data.generated_by}: {data.command}" if data.command else data.generated_by,

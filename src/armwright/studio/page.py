@@ -62,7 +62,7 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         title=html.escape(f"{workbench.cell.name} - armwright studio"),
         name=html.escape(workbench.cell.name),
         policy=html.escape(policy),
-        style="\n".join([asset("page.css"), asset("film.css"), asset("run.css"), _asset("studio.css")]),
+        style="\n".join([asset("page.css"), asset("film.css"), asset("view.css"), _asset("studio.css")]),
         data=json_text({**_shown_first(workbench), "token": token}),
         script=script,
     )
