@@ -31,6 +31,8 @@ ALL = (
     "language",
     "play",
     "calibration",
+    "studio",
+    "studio_page",
 )
 PEERS = (
     "pin",

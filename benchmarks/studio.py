@@ -2,8 +2,7 @@
 
 Every arm of the catalogue with six joints stands with a table and twenty parts around it, so that solutions, warnings
 and the nearest bodies are worked out for every answer, as when somebody drags. The server and the program that asks it
-have a core each where there are two. ``--page`` opens the page in the system's Chromium as well: its first view, and
-the pictures a second while states come.
+have a core each where there are two.
 """
 
 from measure import progress, section, table  # isort: skip - sets the threads first
@@ -28,7 +27,7 @@ from armwright.arm.load import arm_names
 from armwright.cli.studio import _bent
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-ROUND_TRIPS, BODIES, MEGABYTE = 400, 20, 2**20
+ROUND_TRIPS, BODIES = 400, 20
 
 
 class Figures(NamedTuple):
@@ -42,14 +41,17 @@ class Figures(NamedTuple):
     page: float
 
 
-def cell_text(name: str, parts: int) -> str:
-    """Return a cell file with an arm, a table below it, and parts on a ring around it, a hand's breadth apart."""
+def cell_text(name: str, parts: int, arms: int = 1) -> str:
+    """Return a cell file with arms, a table below them, and parts on a ring around the first."""
     arm = armwright.load_arm(str(EXAMPLES / name) if name.endswith(".urdf") else name)
     model = name if not name.endswith(".urdf") else str(EXAMPLES / name)
     start = ", ".join(f"{value:.6f}" for value in _bent(arm))
-    lines = [f'[arms.ARM_1]\nmodel = "{model}"\njoint_positions = [{start}]\n']
+    lines = []
+    for k in range(arms):
+        base = f"[1, 0, 0,  0, 1, 0,  0, 0, 1,  {3.2 * k}, 0, 0]"
+        lines.append(f'[arms.ARM_{k + 1}]\nmodel = "{model}"\nbase = {base}\njoint_positions = [{start}]\n')
     if parts:
-        lines.append("[scene.table]\nz = -0.6\nfrom = [-2, -2]\nto = [2, 2]\n")
+        lines.append("[scene.table]\nz = -0.6\nfrom = [-2, -2]\nto = [5, 2]\n")
     for number in range(parts):
         angle = 2 * np.pi * number / parts
         x, y = 1.3 * np.cos(angle), 1.3 * np.sin(angle)
