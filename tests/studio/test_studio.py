@@ -407,6 +407,29 @@ def test_what_a_camera_sees() -> None:
     assert "no camera" in studio.state(1)["refusal"]
 
 
+def test_a_process_steps(tmp_path: Path) -> None:
+    """Of two processes that stand the one that is named steps, and the other stays."""
+    text = (
+        "VAR k : SCALAR ;\nBEGIN\nCOBEGIN\nBEGIN PAUSE 0.5 ;\nPAUSE 9 END ;\n"
+        "BEGIN PAUSE 1 ;\nk = 1 ;\nPAUSE 1 END\nCOEND\nEND.\n"
+    )
+    pages = Pages(tmp_path, program=text)
+    pages.send("break", line=5, on=True)
+    pages.send("run")
+    pages.wait(2.0)
+
+    def lines() -> dict[str, int]:
+        return {it["process"]: it["line"] for it in pages.state()["run"]["lines"]}
+
+    other = next(name for name, line in lines().items() if line == 6)
+    for line in (7, 8):
+        assert pages.send("go", way="next", process=other) == ""
+        pages.wait(2.0)
+        assert lines()[other] == line
+        assert 5 in lines().values()
+    assert "did you mean" in pages.send("go", way="next", process=f"{other}x")
+
+
 def test_run_from_here(pages: Pages) -> None:
     """From a line on the program runs from where the arm is, and one line by itself."""
     pages.send("joint", arm="ARM_1", joint=1, value=0.5)

@@ -268,9 +268,15 @@ class Run:
 
 @attrs.frozen(kw_only=True)
 class Go:
-    """Go on with a run, or a step on or back."""
+    """Go on with a run, or a step on or back.
+
+    Attributes:
+        way: how.
+        process: the name of the process that steps; the one that stands when left out.
+    """
 
     way: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+    process: str = ""
 
 
 @attrs.frozen(kw_only=True)

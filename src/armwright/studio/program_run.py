@@ -14,6 +14,7 @@ from armwright.cell.frames import FrameTree
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.observations import Picture
+from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.servo import Measured
 from armwright.physics.world import PhysicsCell
@@ -84,11 +85,16 @@ class ProgramRun:
         self.debugger.begin(stop_on_entry=stop_on_entry)
         self.playing = True
 
-    def go(self, way: Way) -> None:
+    def go(self, way: Way, process: str = "") -> None:
         """Go on, or a step on or back.
+
+        Args:
+            way: how.
+            process: the name of the process that steps, as ``lines`` gives it; the one that stands when left out.
 
         Raises:
             DebuggerError: the program is over.
+            UnknownNameError: no process of this name stands.
         """
         debugger = self.debugger
         self._wait()
@@ -99,9 +105,14 @@ class ProgramRun:
             # A step goes on from where the program stands, not from what is shown.
             debugger.pause()
             self.time = self.end
-        process = debugger.stop.path if debugger.stop is not None else ()
+        path = debugger.stop.path if debugger.stop is not None else ()
+        if process:
+            paths = {self.debugger.stack(it.path)[0].title: it.path for it in self.debugger.processes}
+            if process not in paths:
+                raise UnknownNameError("process", process, paths)
+            path = paths[process]
         command: Command = way
-        debugger.resume(command, process)
+        debugger.resume(command, path)
         self._backwards = way == "back"
         self.playing = True
 

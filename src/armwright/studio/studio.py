@@ -197,7 +197,7 @@ class Studio:
                 project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
                 project.running().rate = rate
             case m.Go():
-                project.running().go(command.way)
+                project.running().go(command.way, command.process)
             case m.Pause():
                 project.running().pause()
             case m.Stop():

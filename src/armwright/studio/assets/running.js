@@ -10,7 +10,8 @@ function startRun() {
 }
 
 function step(way) {
-  send(live.state.run ? { do: "go", way } : runMessage({ entry: true }));
+  const process = byId("process").hidden || way === "back" ? "" : byId("process").value;
+  send(live.state.run ? { do: "go", way, process } : runMessage({ entry: true }));
 }
 
 function showRun(state) {
@@ -28,6 +29,7 @@ function showRun(state) {
   const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
   byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
+  showProcesses(run);
   showTrace(run?.trace ?? null);
   showVariables(run?.variables ?? []);
 }
@@ -78,6 +80,17 @@ function toggleVideo() {
   button.textContent = "End the video";
 }
 
+// Of several processes that stand one is chosen to step; that which stopped the run at first.
+function showProcesses(run) {
+  const names = run && !run.playing && !run.running ? run.lines.map(({ process }) => process) : [];
+  const field = byId("process");
+  field.hidden = names.length < 2;
+  const key = JSON.stringify(names);
+  if (field.dataset.key === key) return;
+  field.dataset.key = key;
+  field.replaceChildren(make("option", { value: "", textContent: "the process that stands" }), ...names.map((name) => make("option", { value: name, textContent: name })));
+}
+
 function showVariables(variables) {
   byId("variables-card").hidden = !variables.length;
   const key = JSON.stringify(variables);
@@ -94,7 +107,7 @@ function startRunning() {
     button.addEventListener("click", () => send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name }));
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
-  byId("step").addEventListener("click", () => step("next"));
+  byId("step").addEventListener("click", () => step(byId("step-way").value));
   byId("back").addEventListener("click", () => send({ do: "go", way: "back" }));
   byId("stop").addEventListener("click", () => send({ do: "stop" }));
   byId("pace").addEventListener("change", (event) => {
@@ -102,7 +115,7 @@ function startRunning() {
   });
   document.addEventListener("keydown", (event) => {
     const typing = event.target.matches("textarea, input[type=text], input[type=number]");
-    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", way: "back" }) : step("next")) };
+    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", way: "back" }) : step(byId("step-way").value)) };
     if (event.key === " " && !typing && !event.target.matches("button, select, input") && live.state?.run?.playing) keys[" "] = () => send({ do: "pause" });
     if (!keys[event.key] || !mine()) return;
     event.preventDefault();
