@@ -427,7 +427,7 @@ def test_a_process_steps(tmp_path: Path) -> None:
         pages.wait(2.0)
         assert lines()[other] == line
         assert 5 in lines().values()
-    assert "did you mean" in pages.send("go", way="next", process=f"{other}x")
+    assert f"Did you mean '{other}'" in pages.send("go", way="next", process=f"{other}x")
 
 
 def test_run_from_here(pages: Pages) -> None:
