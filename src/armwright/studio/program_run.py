@@ -21,7 +21,8 @@ from armwright.physics.world import PhysicsCell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.stop_reason import Stop
-from armwright.program.vm.recording import Effect, Recording
+from armwright.program.vm.recording import Recording
+from armwright.studio.shown_effects import ShownEffects
 
 # A run is computed for so long at a time [s], and so far ahead of what is shown [s].
 _SLICE, _AHEAD = 0.008, 1.0
@@ -65,6 +66,7 @@ class ProgramRun:
         self.debugger = Debugger(code, cell, hardware=hardware)
         self._executor = executor
         self._computing: Future[Stop | None] | None = None
+        self._happened = ShownEffects()
         self._paths: dict[str, tuple[int, list[list[float]]]] = {}
         self._variables: tuple[Stop | None, list[dict[str, str]]] = (None, [])
         self.time, self.playing, self.rate = 0.0, False, 1.0
@@ -205,14 +207,11 @@ class ProgramRun:
         taken = hardware.pictures if isinstance(hardware, PhysicsCell) else ()
         return tuple(picture for picture in taken if picture.time <= self.time + 1e-9)
 
-    def devices(self) -> dict[str, bool]:
-        """Return which devices have been switched, and whether they are on, at the time that is shown."""
-        switched: dict[str, bool] = {}
-        for effect in self.debugger.machine.state.effects:
-            if effect.kind == "OPERATE" and effect.t0 <= self.time + 1e-9:
-                device, _, state = effect.text.rpartition(" ")
-                switched[device.upper()] = state == "ON"
-        return switched
+    @property
+    def happened(self) -> ShownEffects:
+        """What has happened up to the time that is shown."""
+        self._happened.update(self.debugger.machine.state.effects, self.time)
+        return self._happened
 
     def path(self, arm: str) -> list[list[float]]:
         """Return where the tool of an arm goes on the path that is known: rows of time [s], x, y and z [m]."""
@@ -245,14 +244,6 @@ class ProgramRun:
             self._variables = stop, rows
         return self._variables[1]
 
-    def opening(self, arm: str) -> float:
-        """Return how far the fingers of an arm are open, 0 to 1, at the time that is shown."""
-        share = 1.0
-        for effect in self.debugger.machine.state.effects:
-            if effect.arm == arm and effect.kind in {"OPEN", "GRASP"} and effect.t0 <= self.time:
-                share = 1.0 if effect.kind == "OPEN" else 0.0
-        return share
-
     def lines(self) -> list[dict[str, Any]]:
         """Return in which line each process is, as plain data: its name, the arm that it moves, the line."""
         machine = self.debugger.machine
@@ -268,21 +259,15 @@ class ProgramRun:
                 }
                 for process, frame in stands
             ]
-        latest: dict[str, Effect] = {}
-        for effect in machine.state.effects:
-            if effect.t0 <= self.time + 1e-9:
-                latest[effect.process] = effect
-        return [
-            {"process": name, "arm": effect.arm, "line": machine.code.source.line(effect.span.start)}
-            for name, effect in latest.items()
-        ]
+        latest = self.happened.latest
+        # A process that waits for others, as for its branches, is in no line.
+        busy = [it for it in latest.values() if it.t1 >= self.time - 1e-9]
+        shown = busy or [max(latest.values(), key=lambda it: it.order)] if latest else []
+        return [{"process": it.process, "arm": it.arm, "line": machine.code.source.line(it.span.start)} for it in shown]
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of the run, as plain data."""
         stop = self.stop
-        source = self.debugger.machine.code.source
-        trace = [effect for effect in self.debugger.machine.state.effects if effect.t0 <= self.time + 1e-9]
-        trace.sort(key=lambda effect: effect.order)
         return {
             "time": round(self.time, 4),
             "end": round(self.end, 4),
@@ -294,11 +279,15 @@ class ProgramRun:
             "text": "" if stop is None or stop.diagnostic is None else stop.diagnostic.message,
             "motions": {name: self._motion_state(name) for name in self._cell.arms},
             "variables": self.variables(),
-            "trace": [
-                {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
-                for effect in trace[-_TRACE:]
-            ],
         }
+
+    def trace(self) -> list[dict[str, Any]]:
+        """Return the latest of what has happened, as plain data."""
+        source = self.debugger.machine.code.source
+        return [
+            {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
+            for effect in self.happened.begun[-_TRACE:]
+        ]
 
     def _motion_state(self, arm: str) -> dict[str, list[float]]:
         names = ("q", "qd", "qdd")

@@ -219,11 +219,11 @@ class Project:
 
     def _known_devices(self) -> list[str]:
         """Return the devices of the cell, and those that a run has switched."""
-        switched = {} if self.run is None else self.run.devices()
+        switched = {} if self.run is None else self.run.happened.devices
         return sorted({*(self.workbench.cell.devices or ()), *switched})
 
     def _device_states(self) -> dict[str, bool]:
-        switched = dict.fromkeys(self.devices, True) if self.run is None else self.run.devices()
+        switched = dict.fromkeys(self.devices, True) if self.run is None else self.run.happened.devices
         return {name: switched.get(name, False) for name in self._known_devices()}
 
     def camera_picture(self, camera: str) -> Callable[[], bytes]:

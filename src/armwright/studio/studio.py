@@ -282,6 +282,10 @@ class Studio:
                 (id(run), 0 if run is None else run.path_number),
                 lambda: {} if run is None else {name: run.path(name) for name in arms},
             ),
+            "trace": (
+                (id(run), 0 if run is None else len(run.happened.begun), 0 if run is None else run.path_number),
+                lambda: [] if run is None else run.trace(),
+            ),
             "compared": (
                 tuple(motion.number for motion in project.compared),
                 lambda: [motion.state() for motion in project.compared],

@@ -219,7 +219,7 @@ class Workbench:
             self._tree, self._spelled = tree, run.spelled
             self._changes += 1
         widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
-        openings = {name: run.opening(name) * width for name, width in widths.items()}
+        openings = {name: run.happened.openings.get(name, 1.0) * width for name, width in widths.items()}
         key = tuple((carrier, X.tobytes()) for carrier, X in parts.values()), tuple(openings.values())
         if key != self._followed:
             self._followed, self._checks = key, None

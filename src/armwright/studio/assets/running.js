@@ -30,16 +30,12 @@ function showRun(state) {
   byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
   showProcesses(run);
-  showTrace(run?.trace ?? null);
+  if (state.trace !== undefined) showTrace(state.trace);
   showVariables(run?.variables ?? []);
 }
 
 function showTrace(trace) {
-  if (!trace) return;
   const list = byId("trace");
-  const key = `${trace.length} ${trace.at(-1)?.t}`;
-  if (list.dataset.key === key) return;
-  list.dataset.key = key;
   list.replaceChildren(
     ...trace.map(({ t, line, text }) => make("li", {}, make("time", { textContent: `${number(t, 2)} s` }), make("span", { className: "quiet", textContent: `line ${line}` }), make("span", { textContent: text }))),
   );

@@ -76,8 +76,8 @@ function showLink(state) {
   button.hidden = !state || live.lost || (state.control.mine && !state.control.asked);
   button.textContent = state?.control.mine ? "Hand over" : state?.control.asking ? "Asked" : "Ask for control";
   button.disabled = Boolean(state?.control.asking);
-  for (const control of document.querySelectorAll("#panel-move input, .hold, #open, #close, #panel-teach button, #panel-teach input"))
-    control.disabled = !mine();
+  for (const control of document.querySelectorAll("#panel-move input, .hold, #open, #close")) control.disabled = !canMove();
+  for (const control of document.querySelectorAll("#panel-teach button, #panel-teach input")) control.disabled = !mine();
 }
 
 function takeArm(i) {
