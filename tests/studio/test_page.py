@@ -239,6 +239,29 @@ def test_completion(opened: Opened) -> None:
     assert "MOVE" in page.locator("#description").inner_text()
 
 
+def test_what_is_kept(opened: Opened, tmp_path: Path) -> None:
+    """The view is kept as a video, the run as a page that opens from the disk, a 3-D file and a film."""
+    page = opened.page
+    page.get_by_role("tab", name="Run").click()
+    page.locator("#pace").select_option("4")
+    page.locator("#run").click()
+    page.locator("#video").click()
+    opened.until(lambda: (opened.state()["run"] or {}).get("reason") == "end")
+    beginnings = {"Page": b"<!DOCTYPE html>", "3-D file": b"glTF", "GIF": b"GIF8"}
+    for name, beginning in beginnings.items():
+        with page.expect_download() as kept:
+            page.get_by_role("button", name=name, exact=True).click()
+        kept.value.save_as(tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(beginning)
+    with page.expect_download() as kept:
+        page.get_by_role("button", name="End the video").click()
+    kept.value.save_as(tmp_path / "video")
+    assert (tmp_path / "video").stat().st_size > 10_000
+    assert (tmp_path / "video").read_bytes()[:12].find(b"ftyp") == 4 or (tmp_path / "video").read_bytes()[
+        :4
+    ] == b"\x1aE\xdf\xa3"
+
+
 def test_two_pages(opened: Opened, browser: Any) -> None:
     """Two pages show one state; the second may command when the first hands over, and goes on when that is closed."""
     first, other = opened.page, browser.new_page()
