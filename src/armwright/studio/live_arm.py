@@ -82,7 +82,7 @@ class LiveArm:
 
     Attributes:
         name: of the arm in the cell.
-        placed: the arm and its place.
+        placed: the arm, with its base.
         q: (n,) joint positions.
     """
 
@@ -236,7 +236,7 @@ class LiveArm:
             J = self.jacobian_at(q)
             step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * min(1.0, float(error @ error)) * np.eye(6), error)
             q = np.clip(q + step, self.lower, self.upper)
-        raise UnreachableError(f"{self.name} finds no way there: out of reach, or beyond a limit")
+        raise UnreachableError(f"{self.name} finds no configuration there: out of reach, or beyond a limit")
 
     def jacobian_at(self, q: Array) -> Array:
         """Return the Jacobian (6, n) at joint positions (n,), axes of the base."""
@@ -279,14 +279,14 @@ class LiveArm:
 def _labels(geometry: ClosedFormGeometry, q: Array) -> list[str]:
     """Return the names of the branches that configurations (k, n) are in.
 
-    Branches meet where a factor of the determinant of the Jacobian vanishes: its signs tell them apart.
+    Branches meet where a factor of the determinant of the Jacobian vanishes: they differ in its signs.
     """
     angles = geometry.angles(list(q.T))
     side, second, flip = (np.where(factor >= 0, 1, -1).tolist() for factor in determinant_factors(geometry, angles))
     # The factor of an elbow falls where its angle grows.
-    way = 1 if geometry.family == "stanford" else -1
+    sign = 1 if geometry.family == "stanford" else -1
     rows = np.array(angles).T.tolist()
-    return [label(geometry, (side[i], way * second[i], flip[i]), row) for i, row in enumerate(rows)]
+    return [label(geometry, (side[i], sign * second[i], flip[i]), row) for i, row in enumerate(rows)]
 
 
 def _direction_text(twist: Array) -> str:

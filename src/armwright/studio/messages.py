@@ -72,14 +72,14 @@ class Jog:
         arm: name of the arm.
         frame: ``JOINT``, ``BASE``, ``TOOL``, ``WORLD`` or the name of a frame, whose axes are meant.
         axis: from 0: a joint; or x, y, z, then the rotations about them.
-        way: 1 or -1.
+        sign: 1 or -1.
         share: of the full jogging speed, above 0 to 1.
     """
 
     arm: str
     frame: str
     axis: int
-    way: Literal[1, -1]
+    sign: Literal[1, -1]
     share: float
 
 
@@ -271,11 +271,11 @@ class Go:
     """Go on with a run, or a step on or back.
 
     Attributes:
-        way: how.
+        step: which.
         process: the name of the process that steps; the one that stands when left out.
     """
 
-    way: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+    step: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
     process: str = ""
 
 

@@ -33,7 +33,7 @@ _MOST_VARIABLES = 100
 # Of a path as many of the latest stretches are shown, each by so many points a second [1/s], and at most so many.
 _PATH_SEGMENTS, _PATH_RATE, _PATH_POINTS = 40, 25.0, 200
 
-Way: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+Step: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back"]
 
 
 class ProgramRun:
@@ -87,11 +87,11 @@ class ProgramRun:
         self.debugger.begin(stop_on_entry=stop_on_entry)
         self.playing = True
 
-    def go(self, way: Way, process: str = "") -> None:
+    def go(self, step: Step, process: str = "") -> None:
         """Go on, or a step on or back.
 
         Args:
-            way: how.
+            step: which.
             process: the name of the process that steps, as ``lines`` gives it; the one that stands when left out.
 
         Raises:
@@ -101,7 +101,7 @@ class ProgramRun:
         debugger = self.debugger
         self._wait()
         if debugger.running or self.time < self.end - 1e-9:
-            if way == "continue":
+            if step == "continue":
                 self.playing = True
                 return
             # A step goes on from where the program stands, not from what is shown.
@@ -113,9 +113,9 @@ class ProgramRun:
             if process not in paths:
                 raise UnknownNameError("process", process, paths)
             path = paths[process]
-        command: Command = way
+        command: Command = step
         debugger.resume(command, path)
-        self._backwards = way == "back"
+        self._backwards = step == "back"
         self.playing = True
 
     def pause(self) -> None:

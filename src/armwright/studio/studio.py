@@ -1,4 +1,4 @@
-"""A studio: does what pages ask for, and tells them what to show."""
+"""A studio: carries out the commands of pages, and gives them the state to show."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ class Studio:
                 project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
                 project.running().rate = rate
             case m.Go():
-                project.running().go(command.way, command.process)
+                project.running().go(command.step, command.process)
             case m.Pause():
                 project.running().pause()
             case m.Stop():
@@ -226,7 +226,7 @@ class Studio:
             return changed
         jog = self._jog
         try:
-            self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.way * jog.share * seconds, now)
+            self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.sign * jog.share * seconds, now)
         except ArmwrightError as error:
             self.refuse(self.control.page, error)
         return True
@@ -260,7 +260,7 @@ class Studio:
         return state
 
     def _seldom_changed(self) -> dict[str, tuple[object, Callable[[], Any]]]:
-        """Return what is sent only when it changes: by its key in the state what tells that, and how it is had."""
+        """Return what is sent only when it changes, by its key in the state: what it depends on, and what makes it."""
         project, bench, run = self.project, self.workbench, self.project.run
         arms = bench.arms
         pictures = () if run is None else run.pictures()

@@ -42,13 +42,13 @@ export default {
     const listen = (event) => {
       if (event.source === frame.contentWindow) model.send(event.data);
     };
-    const tell = (message) => frame.contentWindow?.postMessage(message, "*");
+    const push = (message) => frame.contentWindow?.postMessage(message, "*");
     window.addEventListener("message", listen);
-    model.on("msg:custom", tell);
+    model.on("msg:custom", push);
     el.append(frame);
     return () => {
       window.removeEventListener("message", listen);
-      model.off("msg:custom", tell);
+      model.off("msg:custom", push);
     };
   },
 };
@@ -124,20 +124,20 @@ def live_widget(cell: Cell) -> Any:
     widget.studio = studio
     ticking: list[asyncio.Task[None]] = []
 
-    def tell() -> None:
+    def push() -> None:
         widget.send(json.dumps(studio.state(_PAGE), separators=(",", ":"), allow_nan=False))
 
     async def tick() -> None:
         while studio.moves:
             await asyncio.sleep(_TICK)
             if studio.tick(time.monotonic(), _TICK):
-                tell()
+                push()
 
     def receive(_: object, content: object, __: object) -> None:
         if not isinstance(content, str):
             return
         if content == "hello" or studio.receive(content, _PAGE, time.monotonic()):
-            tell()
+            push()
         while studio.jobs:
             _, job = studio.jobs.pop()
             widget.send(json.dumps(job()))

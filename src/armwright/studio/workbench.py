@@ -24,7 +24,7 @@ from armwright.studio.reach_map import Plane, ReachMap
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
 _TURNING, _SLIDING = math.radians(45.0), 0.25
-# Bodies nearer than this are told [m].
+# Bodies nearer than this are reported [m].
 _NEAR = 0.02
 # Changes that can be taken back at most.
 _MOST_UNDONE = 200

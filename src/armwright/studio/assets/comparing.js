@@ -3,7 +3,7 @@
 const comparing = { motions: [] };
 const FIGURES = [
   ["duration", "takes", (value) => `${number(value, 2)} s`],
-  ["way", "way of the tool", (value) => `${number(value * MILLIMETRES, 0)} mm`],
+  ["path_length", "path of the tool", (value) => `${number(value * MILLIMETRES, 0)} mm`],
   ["tool_speed", "fastest", (value) => `${number(value * MILLIMETRES, 0)} mm/s`],
   ["speed_share", "speed of joints", (value, it) => `${number(100 * value, 0)} %, J${it.speed_joint}`],
   ["acceleration_share", "acceleration", (value, it) => `${number(100 * value, 0)} %, J${it.acceleration_joint}`],

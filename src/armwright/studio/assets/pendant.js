@@ -58,14 +58,14 @@ function sliderRow(joint, j) {
     if (Number.isFinite(value) && typed.value.trim()) set(value / factor);
     typed.blur();
   });
-  const way = (sign) => () => ({ frame: "JOINT", axis: j, way: sign });
+  const along = (sign) => () => ({ frame: "JOINT", axis: j, sign });
   return make(
     "div",
     { className: "slider" },
     make("label", { htmlFor: id, textContent: `J${j + 1}`, title: `${quantityText(QUANTITIES[0], joint, low)} to ${quantityText(QUANTITIES[0], joint, high)}` }),
-    holdButton("−", `Joint ${j + 1} down`, way(-1)),
+    holdButton("−", `Joint ${j + 1} down`, along(-1)),
     slider,
-    holdButton("+", `Joint ${j + 1} up`, way(1)),
+    holdButton("+", `Joint ${j + 1} up`, along(1)),
     make("span", { className: "value" }, typed, QUANTITIES[0].units[joint.kind]),
   );
 }
@@ -92,7 +92,7 @@ function fillPendant() {
         holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, `${axis < 3 ? "Move" : "Turn"} ${sign > 0 ? "up" : "down"} ${axis < 3 ? "along " : ""}${name}`, () => ({
           frame: frames.value,
           axis,
-          way: sign,
+          sign,
         })),
       ),
     ),

@@ -6,12 +6,12 @@ function runMessage(extra = {}) {
 }
 
 function startRun() {
-  send(live.state.run ? { do: "go", way: "continue" } : runMessage());
+  send(live.state.run ? { do: "go", step: "continue" } : runMessage());
 }
 
-function step(way) {
+function goOn(way) {
   const process = byId("process").hidden || way === "back" ? "" : byId("process").value;
-  send(live.state.run ? { do: "go", way, process } : runMessage({ entry: true }));
+  send(live.state.run ? { do: "go", step: way, process } : runMessage({ entry: true }));
 }
 
 function showRun(state) {
@@ -103,15 +103,15 @@ function startRunning() {
     button.addEventListener("click", () => send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name }));
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
-  byId("step").addEventListener("click", () => step(byId("step-way").value));
-  byId("back").addEventListener("click", () => send({ do: "go", way: "back" }));
+  byId("step").addEventListener("click", () => goOn(byId("step-way").value));
+  byId("back").addEventListener("click", () => send({ do: "go", step: "back" }));
   byId("stop").addEventListener("click", () => send({ do: "stop" }));
   byId("pace").addEventListener("change", (event) => {
     if (live.state.run) send({ do: "pace", rate: Number(event.target.value) });
   });
   document.addEventListener("keydown", (event) => {
     const typing = event.target.matches("textarea, input[type=text], input[type=number]");
-    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", way: "back" }) : step(byId("step-way").value)) };
+    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", step: "back" }) : goOn(byId("step-way").value)) };
     if (event.key === " " && !typing && !event.target.matches("button, select, input") && live.state?.run?.playing) keys[" "] = () => send({ do: "pause" });
     if (!keys[event.key] || !mine()) return;
     event.preventDefault();
@@ -128,9 +128,9 @@ function startRunning() {
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => choose(tab));
     tab.addEventListener("keydown", (event) => {
-      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!way) return;
-      const next = tabs[(i + way + tabs.length) % tabs.length];
+      const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!by) return;
+      const next = tabs[(i + by + tabs.length) % tabs.length];
       choose(next);
       next.focus();
     });
