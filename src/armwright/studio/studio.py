@@ -9,6 +9,7 @@ from typing import Any
 
 from armwright.cell.observations import Picture
 from armwright.errors import ArmwrightError
+from armwright.program.debugger.debugger import DebuggerError
 from armwright.studio import messages as m
 from armwright.studio.control import Control
 from armwright.studio.downloads import download
@@ -171,8 +172,8 @@ class Studio:
         match command:
             case m.Keep():
                 self.workbench.arm(command.arm)
-                recording, what, arm = project.running().recording(), command.what, command.arm
-                self.jobs.append((page, lambda: download(recording, what, arm).message()))
+                run, what, arm = project.running(), command.what, command.arm
+                self.jobs.append((page, lambda: download(run.recording(), what, arm).message()))
             case m.Look():
                 take, camera = project.camera_picture(command.camera), command.camera
                 self.jobs.append((page, lambda: _picture_message(camera, take())))
@@ -234,10 +235,14 @@ class Studio:
     def _tick_run(self, seconds: float) -> bool:
         try:
             return self.project.tick(seconds)
-        except ArmwrightError as error:
-            self.project.run = None
+        except DebuggerError as error:
             self.refuse(self.control.page, error)
-            return True
+        except Exception as error:  # noqa: BLE001 - whatever ends a run, what has been taught is not lost with it
+            known = isinstance(error, ArmwrightError)
+            text = str(error) if known else f"the run ended by a mistake of armwright: {type(error).__name__}: {error}"
+            self.project.run = None
+            self.refuse(self.control.page, ArmwrightError(text))
+        return True
 
     def refuse(self, page: int | None, error: ArmwrightError) -> None:
         """Tell a page why what it began does not go on."""
@@ -279,11 +284,11 @@ class Studio:
                 lambda: None if bench.map is None else bench.map.state(),
             ),
             "paths": (
-                (id(run), 0 if run is None else run.path_number),
+                (id(run), None if run is None else run.path_key),
                 lambda: {} if run is None else {name: run.path(name) for name in arms},
             ),
             "trace": (
-                (id(run), 0 if run is None else len(run.happened.begun), 0 if run is None else run.path_number),
+                (id(run), 0 if run is None else len(run.happened.begun), None if run is None else run.path_key),
                 lambda: [] if run is None else run.trace(),
             ),
             "compared": (
