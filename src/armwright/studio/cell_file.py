@@ -16,6 +16,7 @@ from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_text
 from armwright.files.output import write_back
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.spatial.poses import inverse, to_noap
 
 # Decimals of rotations and of positions [m] of frames, and of joint positions [rad], [m].
@@ -189,6 +190,8 @@ class CellFile:
     def _check_name(name: str) -> None:
         if not _NAME.match(name):
             raise TeachingError(f"a name has letters, digits and _, and begins with a letter, got {name!r}")
+        if name.upper() in VOCABULARIES[Standard.RLO_2].reserved:
+            raise TeachingError(f"{name.upper()} is a word of the language and cannot be a name")
 
     def _take(self, document: Any) -> None:
         """Take a changed document, if it is a cell."""

@@ -42,14 +42,6 @@ class SetJoint:
 
 
 @attrs.frozen(kw_only=True)
-class SetJoints:
-    """Bring all joints of an arm to positions [rad] or [m]."""
-
-    arm: str
-    q: tuple[float, ...]
-
-
-@attrs.frozen(kw_only=True)
 class MoveTool:
     """Bring the tool to a pose in the world, twelve numbers n, o, a, p.
 
@@ -368,7 +360,6 @@ class Describe:
 Command: TypeAlias = (
     Got
     | SetJoint
-    | SetJoints
     | MoveTool
     | Jog
     | Halt
@@ -408,7 +399,6 @@ Command: TypeAlias = (
 _COMMANDS: dict[str, type[Any]] = {
     "got": Got,
     "joint": SetJoint,
-    "joints": SetJoints,
     "tool": MoveTool,
     "jog": Jog,
     "halt": Halt,

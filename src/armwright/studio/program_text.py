@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -136,9 +138,12 @@ class ProgramText:
             offset: of the position.
 
         Raises:
+            ProgramTextError: the position is not in the text.
             MissingExtraError: the language server is not installed.
         """
         server = import_extra("armwright.program.language_server.completions", "completion", "studio", "lsprotocol")
+        if not 0 <= offset <= len(text):
+            raise ProgramTextError(f"expected a position from 0 to {len(text)}, got {offset}")
         codec = PositionCodec(text, UTF_32)
         items = server.completions(codec, self._analysis(codec), offset, snippets=False)[:_MOST_COMPLETIONS]
         return [
@@ -373,3 +378,20 @@ class ProgramText:
                 for fix in it.fixes
             ],
         }
+
+
+def moved_lines(lines: Iterable[int], before: str, after: str) -> set[int]:
+    """Return where lines of a text, from 1, are in a changed one; those that are not there any more are left out."""
+    old, new = before.split("\n"), after.split("\n")
+    shortest = min(len(old), len(new))
+    head = next((i for i in range(shortest) if old[i] != new[i]), shortest)
+    tail = next((i for i in range(shortest - head) if old[-1 - i] != new[-1 - i]), shortest - head)
+    moved = {line: line for line in range(1, head + 1)}
+    moved |= {len(old) - i: len(new) - i for i in range(tail)}
+    changed = old[head : len(old) - tail], new[head : len(new) - tail]
+    for block in difflib.SequenceMatcher(None, *changed, autojunk=False).get_matching_blocks():
+        moved |= {head + block.a + i + 1: head + block.b + i + 1 for i in range(block.size)}
+    if len(changed[0]) == len(changed[1]):
+        # A line that is being written stays the same line.
+        moved |= {line: line for line in range(head + 1, len(old) - tail + 1) if line not in moved}
+    return {moved[line] for line in lines if line in moved}

@@ -13,14 +13,14 @@ from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.errors import UnknownNameError
 from armwright.files.inputs import read_program
+from armwright.physics.camera_view import CameraView
 from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.physics.world import PhysicsCell
 from armwright.program.api import add_imported_frames
-from armwright.studio.camera_view import CameraView
 from armwright.studio.cell_file import CellFile, TeachingError
 from armwright.studio.comparison import KeptMotion, kept_motion
 from armwright.studio.program_run import ProgramRun
-from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError
+from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError, moved_lines
 from armwright.studio.workbench import Workbench
 
 _MOST_BREAKPOINTS = 1000
@@ -58,6 +58,7 @@ class Project:
         self.breakpoints: set[int] = set()
         self.devices: set[str] = set()
         self.compared: list[KeptMotion] = []
+        self._kept = 0
         self.executor: Executor | None = None
         self._camera_view: tuple[Cell, CameraView] | None = None
 
@@ -84,10 +85,14 @@ class Project:
         self._teach(name, self.workbench.arm(arm).tool, on)
 
     def _teach(self, name: str, X_WF: Array, on: str) -> None:
-        file, poses = self._teachable(), self.workbench.frame_poses()
-        if on != WORLD and on not in poses:
-            raise UnknownNameError("frame", on, [WORLD, *poses])
-        file.teach(name, X_WF, on, None if on == WORLD else poses[on])
+        # A program that has run may have moved the frame that is shown; the file has it where it is at the start.
+        file, on = self._teachable(), on.upper()
+        tree = file.cell.tree()
+        for each, arm in self.workbench.arms.items():
+            tree = tree.set_pose(each, arm.tool)
+        if on != WORLD and (on not in tree or on in self.workbench.arms):
+            raise UnknownNameError("frame", on, [it for it in tree if it not in self.workbench.arms])
+        file.teach(name, X_WF, on, None if on == WORLD else tree.world(on))
         self._taught(file)
 
     def rename(self, name: str, new: str) -> None:
@@ -120,13 +125,17 @@ class Project:
         form.clauses(arm, frame)
         self.program.require_statements()
         self.teach(arm, frame)
+        before = self.program.text
         self.program.insert_move(line, arm, frame.upper(), form)
+        self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
 
     def insert_via(self, arm: str, frame: str, line: int, blend: float) -> None:
         """Teach a frame where the tool is, and let the MOVE in a line go past it; both or neither."""
         self.program.check_via(line)
         self.teach(arm, frame)
+        before = self.program.text
         self.program.insert_via(line, frame.upper(), blend)
+        self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
 
     def teach_joints(self, arm: str, name: str) -> None:
         """Give a joint target the configuration of an arm; it is added where there is none."""
@@ -156,7 +165,9 @@ class Project:
         """
         if version != self.program.version:
             raise ProgramTextError("the program has been changed meanwhile; the newest text is shown")
+        before = self.program.text
         self.program.replace(text)
+        self.breakpoints = moved_lines(self.breakpoints, before, text)
 
     def set_breakpoint(self, line: int, *, on: bool) -> None:
         """Set or remove a breakpoint."""
@@ -239,6 +250,8 @@ class Project:
 
         def take() -> bytes:
             if self._camera_view is None or self._camera_view[0] is not cell:
+                if self._camera_view is not None:
+                    self._camera_view[1].close()
                 self._camera_view = cell, CameraView(cell)
             return self._camera_view[1].picture(camera, configurations, parts)
 
@@ -246,7 +259,8 @@ class Project:
 
     def keep_motion(self) -> None:
         """Keep the motion of the run, to be compared with another one; of three the first is forgotten."""
-        self.compared = [*self.compared, kept_motion(self.running().recording(), len(self.compared) + 1)][-2:]
+        self._kept += 1
+        self.compared = [*self.compared, kept_motion(self.running().recording(), self._kept)][-2:]
 
     def tick(self, seconds: float) -> bool:
         """Let the run go on for a time [s]; return whether anything has changed."""

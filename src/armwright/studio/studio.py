@@ -21,10 +21,11 @@ from armwright.studio.project import Project
 _JOG_TIMEOUT = 0.25
 # How fast a run can be shown, 1 being real time.
 _RATES = (0.05, 8.0)
+# A map is sent again when so many points more are known.
+_MAP_POINTS = 200
 # What has to wait until a run has ended.
 _NOT_IN_A_RUN = (
     m.SetJoint,
-    m.SetJoints,
     m.MoveTool,
     m.Jog,
     m.TakeSolution,
@@ -110,8 +111,6 @@ class Studio:
         match command:
             case m.SetJoint():
                 bench.set_joint(command.arm, command.joint, command.value, now)
-            case m.SetJoints():
-                bench.set_joints(command.arm, command.q, now)
             case m.MoveTool():
                 bench.move_tool(command.arm, command.pose, now, leaping=command.leaping)
             case m.GoTo():
@@ -188,9 +187,10 @@ class Studio:
         project = self.project
         match command:
             case m.SetText():
+                # A page whose text is not taken gets the one that there is.
+                self._sent.setdefault(page, {}).pop("source", None)
                 project.set_text(command.text, command.version)
-                # The page has it: it is not sent back.
-                self._sent.setdefault(page, {})["source"] = project.program.version
+                self._sent[page]["source"] = project.program.version
             case m.Break():
                 project.set_breakpoint(command.line, on=command.on)
             case m.Run():
@@ -280,7 +280,7 @@ class Studio:
             ),
             "source": (program.version, lambda: program.text),
             "map": (
-                (bench.map_number, bench.map is not None and bench.map.done),
+                (bench.map_number, bench.map is not None and (bench.map.done, bench.map.known // _MAP_POINTS)),
                 lambda: None if bench.map is None else bench.map.state(),
             ),
             "paths": (

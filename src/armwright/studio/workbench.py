@@ -91,23 +91,15 @@ class Workbench:
             raise UnreachableError(f"{name} has joints 1 to {len(arm.q)}, got {joint}")
         q = arm.q.copy()
         q[joint - 1] = value
-        self._changing(arm, f"joint {joint}", now)
+        before = arm.q
         arm.set_joints(q)
-
-    def set_joints(self, name: str, q: tuple[float, ...], now: float) -> None:
-        """Bring all joints of an arm to positions."""
-        arm = self.arm(name)
-        if len(q) != len(arm.q):
-            raise UnreachableError(f"{name} has {len(arm.q)} joints, got {len(q)} numbers")
-        self._changing(arm, "joints", now)
-        arm.set_joints(np.array(q))
+        self._changed(arm, before, f"joint {joint}", now)
 
     def move_tool(self, name: str, pose: tuple[float, ...], now: float, *, leaping: bool) -> None:
         """Bring the tool of an arm to a pose in the world."""
-        arm = self.arm(name)
-        X = from_noap(pose)
-        self._changing(arm, "tool", now)
-        arm.move_tool(X, leaping=leaping)
+        arm, before = self.arm(name), self.arm(name).q
+        arm.move_tool(from_noap(pose), leaping=leaping)
+        self._changed(arm, before, "tool", now)
 
     def jog(self, name: str, frame: str, axis: int, step: float, now: float) -> None:
         """Move an arm by a part of its full jogging speed times a time.
@@ -133,13 +125,13 @@ class Workbench:
             return
         if not 0 <= axis < 6:
             raise UnreachableError(f"axes are numbered from 0 to 5, got {axis}")
-        X, along = arm.tool, self._axes(arm, frame)[:, axis % 3]
-        self._changing(arm, f"jog {frame} {axis}", now)
+        X, along, before = arm.tool, self._axes(arm, frame)[:, axis % 3], arm.q
         if axis < 3:
             X = homogeneous(X[:3, :3], X[:3, 3] + step * _SLIDING * along)
         else:
             X = homogeneous(rotation_from_vector(step * _TURNING * along) @ X[:3, :3], X[:3, 3])
         arm.move_tool(X)
+        self._changed(arm, before, f"jog {frame} {axis}", now)
 
     def _axes(self, arm: LiveArm, frame: str) -> Array:
         """Return the axes (3, 3) of a frame, in its columns."""
@@ -156,9 +148,9 @@ class Workbench:
 
     def go_to(self, name: str, goal: str, now: float) -> None:
         """Bring the tool of an arm to a frame, or the arm to a joint target."""
-        arm, q = self.arm(name), self._configuration_at(name, goal)
-        self._changing(arm, f"go to {goal}", now)
+        arm, q, before = self.arm(name), self._configuration_at(name, goal), self.arm(name).q
         arm.set_joints(q)
+        self._changed(arm, before, f"go to {goal}", now)
 
     def _configuration_at(self, name: str, goal: str) -> Array:
         """Return the configuration (n,) in which an arm is at a frame or a joint target.
@@ -184,8 +176,9 @@ class Workbench:
             raise UnreachableError(f"there are solutions 0 to {len(solutions) - 1}, got {number}")
         if solutions[number].fault:
             raise UnreachableError(solutions[number].fault)
-        self._changing(arm, "solution", now)
+        before = arm.q
         arm.set_joints(solutions[number].q)
+        self._changed(arm, before, "solution", now)
 
     def grip(self, name: str, *, open_it: bool, now: float) -> None:
         """Open or close the gripper of an arm; it takes the part that is between its fingers."""
@@ -195,11 +188,13 @@ class Workbench:
         self._checks = None
         self._changes += 1
 
-    def _changing(self, arm: LiveArm, gesture: str, now: float) -> None:
-        """Keep where an arm is, to return to it, unless it is still moved by the same gesture."""
+    def _changed(self, arm: LiveArm, before: Array, gesture: str, now: float) -> None:
+        """Keep where an arm was, to return to it, unless it is still moved by the same gesture, or has not moved."""
         what, latest = self._gesture
+        if np.array_equal(arm.q, before):
+            return
         if what != f"{arm.name} {gesture}" or now - latest > _ONE_GESTURE:
-            self._undo = [*self._undo, (arm.name, arm.q)][-_MOST_UNDONE:]
+            self._undo = [*self._undo, (arm.name, before)][-_MOST_UNDONE:]
         self._gesture = f"{arm.name} {gesture}", now
 
     def undo(self) -> None:
@@ -263,11 +258,11 @@ class Workbench:
         self.map_number += 1
 
     def map_on(self) -> bool:
-        """Work out some more of the map; return whether all of it has become known."""
+        """Work out some more of the map; return whether there was more."""
         if self.map is None or self.map.done:
             return False
         self.map.step()
-        return self.map.done
+        return True
 
     def preview(self, name: str, goal: str) -> None:
         """Show where an arm would be at a frame or a joint target; without a name, show that no more."""

@@ -55,7 +55,6 @@ function showCompletions() {
   const { items, chosen } = helping;
   const field = byId("text");
   list.hidden = !items.length;
-  field.setAttribute("aria-expanded", String(Boolean(items.length)));
   if (!items.length) {
     field.removeAttribute("aria-activedescendant");
     return;

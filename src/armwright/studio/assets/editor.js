@@ -53,9 +53,14 @@ function fillGutter(lines) {
     const line = gutter.children.length + 1;
     const button = make("button", { type: "button", textContent: line, ariaLabel: `Breakpoint in line ${line}`, tabIndex: -1 });
     button.ariaPressed = "false";
-    button.addEventListener("click", () => send({ do: "break", line, on: button.ariaPressed !== "true" }));
+    button.addEventListener("click", () => toggleBreakpoint(line));
     gutter.append(button);
   }
+}
+
+function toggleBreakpoint(line) {
+  const button = byId("gutter").children[line - 1];
+  send({ do: "break", line, on: button?.ariaPressed !== "true" });
 }
 
 function sendText() {
@@ -116,6 +121,7 @@ function showProblems(diagnostics) {
     ...diagnostics.map((it) => {
       const go = make("button", { type: "button", className: it.severity }, make("b", { textContent: `${it.code} line ${it.line}` }), ` ${it.text}`, ...it.helps.map((help) => make("small", { textContent: help })));
       go.addEventListener("click", () => {
+        if (!editor.problems.length) return;
         byId("text").focus();
         byId("text").setSelectionRange(it.start, it.end);
       });
@@ -131,6 +137,8 @@ function showProblems(diagnostics) {
 }
 
 function applyFixes(fixes) {
+  // What has been typed since has moved the places of the fixes.
+  if (!editor.problems.length) return;
   let text = byId("text").value;
   for (const fix of [...fixes].sort((a, b) => b.start - a.start)) text = text.slice(0, fix.start) + fix.text + text.slice(fix.end);
   byId("text").value = text;

@@ -9,7 +9,6 @@ function takeMap(map) {
 }
 
 function mapColour(value, shades) {
-  if (value === 0) return shades.bad;
   if (value === 1) return shades.warn;
   return mixed(shades.line, shades.good, (value - 2) / 253);
 }

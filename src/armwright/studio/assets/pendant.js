@@ -106,12 +106,14 @@ function showPendant(state) {
   [...byId("sliders").children].forEach((row, j) => {
     const [slider, typed] = [row.querySelector("input[type=range]"), row.querySelector("input[type=text]")];
     const joint = chosenArm().joints[j];
-    slider.value = it.q[j];
+    if (!slider.matches(":active")) slider.value = it.q[j];
     slider.setAttribute("aria-valuetext", quantityText(QUANTITIES[0], joint, it.q[j]));
     if (document.activeElement !== typed) typed.value = number(it.q[j] * unitFactor(QUANTITIES[0], joint), 2);
     row.classList.toggle("near", near.has(j + 1));
   });
-  byId("hand-text").textContent = it.tool ? `tool at ${placeText(it.tool.slice(9))} mm` : "";
+  [...byId("place").querySelectorAll("input")].forEach((field, k) => {
+    if (it.tool && document.activeElement !== field) field.value = number(it.tool[9 + k] * MILLIMETRES, 1).replace("−", "-");
+  });
   byId("grip-text").textContent = it.holds.length ? `holds ${it.holds.join(", ")}` : it.grip > 0.99 ? "open" : it.grip < 0.01 ? "closed" : `${number(100 * it.grip, 0)} % open`;
   showSolutions(it.solutions ?? []);
 }
@@ -149,7 +151,26 @@ function showSolutions(solutions) {
   });
 }
 
+// Where the tool is, to be read and to be typed.
+function fillPlace() {
+  byId("place").replaceChildren(
+    ...["x", "y", "z"].map((name, k) => {
+      const field = make("input", { type: "text", inputMode: "decimal", ariaLabel: `Tool ${name} in mm` });
+      field.addEventListener("change", () => {
+        const value = Number(field.value.replace("−", "-").replace(",", "."));
+        const pose = [...armState().tool];
+        pose[9 + k] = value / MILLIMETRES;
+        if (Number.isFinite(value) && field.value.trim()) send({ do: "tool", arm: chosenArm().name, pose, leaping: true });
+        field.blur();
+      });
+      return make("label", {}, name, " ", field);
+    }),
+    "mm",
+  );
+}
+
 function startPendant() {
+  fillPlace();
   fillPendant();
   const speed = () => {
     byId("share-text").textContent = `${number(100 * share(), share() < 0.1 ? 1 : 0)} %`;

@@ -24,10 +24,14 @@ function showRun(state) {
   byId("back").disabled = off || !run;
   byId("stop").disabled = off || !run;
   byId("physics").disabled = off || Boolean(run);
+  for (const id of ["run-here", "run-line"]) byId(id).disabled = off || Boolean(run) || !program.runs;
+  byId("reset").disabled = off || Boolean(run);
   for (const button of document.querySelectorAll("[data-keep]")) button.disabled = off || !run;
   const texts = { end: "ended", failed: "failed", breakpoint: "stands at a breakpoint", entry: "stands at its beginning", step: "stands", start: "stands at its beginning", exception: "stands at an error", pause: "stands" };
   const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
-  byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
+  byId("run-time").textContent = run ? `${number(run.time, 2)} s` : "";
+  const said = run ? `${what}${run.text ? `: ${run.text}` : ""}` : "";
+  if (byId("run-text").textContent !== said) byId("run-text").textContent = said;
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
   showProcesses(run);
   if (state.trace !== undefined) showTrace(state.trace);
@@ -106,12 +110,16 @@ function startRunning() {
   byId("step").addEventListener("click", () => goOn(byId("step-way").value));
   byId("back").addEventListener("click", () => send({ do: "go", step: "back" }));
   byId("stop").addEventListener("click", () => send({ do: "stop" }));
+  byId("run-here").addEventListener("click", () => send(runMessage({ line: editorLine() })));
+  byId("run-line").addEventListener("click", () => send(runMessage({ line: editorLine(), only: true })));
+  byId("reset").addEventListener("click", () => send({ do: "reset" }));
   byId("pace").addEventListener("change", (event) => {
     if (live.state.run) send({ do: "pace", rate: Number(event.target.value) });
   });
   document.addEventListener("keydown", (event) => {
     const typing = event.target.matches("textarea, input[type=text], input[type=number]");
     const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", step: "back" }) : goOn(byId("step-way").value)) };
+    if (event.key === "F9") keys.F9 = () => toggleBreakpoint(editorLine());
     if (event.key === " " && !typing && !event.target.matches("button, select, input") && live.state?.run?.playing) keys[" "] = () => send({ do: "pause" });
     if (!keys[event.key] || !mine()) return;
     event.preventDefault();

@@ -53,6 +53,9 @@ function showWarnings(state) {
   if (list.dataset.key === key) return;
   list.dataset.key = key;
   list.replaceChildren(...found.map(warningItem));
+  // Whoever listens hears what stops a motion, and not every tenth of a millimetre.
+  const said = found.filter(({ level }) => level === "error").map(({ text }) => text.replace(/[\d.]+/g, "")).join(". ");
+  if (byId("said").textContent !== said) byId("said").textContent = said;
 }
 
 function showLink(state) {
@@ -94,9 +97,11 @@ function takeArm(i) {
 function onKeyDown(event) {
   if (event.key === "Escape") {
     letGo();
+    Object.assign(gizmo, { drag: null, target: null });
     sendNow({ do: "halt" });
+    if (live.state?.run?.playing) send({ do: "pause" });
   }
-  if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("textarea, input[type=text]")) {
+  if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("textarea, input[type=text], input[type=number]")) {
     event.preventDefault();
     send({ do: "undo" });
   }

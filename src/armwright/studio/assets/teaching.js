@@ -1,6 +1,12 @@
 // Teaching: frames of the cell file, and MOVEs to them.
 
-const editorLine = () => byId("text").value.slice(0, byId("text").selectionStart).split("\n").length;
+// The line of the cursor, in the text that the server has.
+function editorLine() {
+  if (editor.timer) sendText();
+  return cursorLine();
+}
+
+const cursorLine = () => byId("text").value.slice(0, byId("text").selectionStart).split("\n").length;
 
 // Of what is taught, a frame or a joint target, with what can be done with it.
 function taughtItem(name, isTarget) {
@@ -44,11 +50,11 @@ function showTeaching(state) {
     list.dataset.names = key;
     list.replaceChildren(...names.map((name, i) => taughtItem(name, i >= frames.length)));
     frames.forEach((name, i) => {
-      for (const button of [...list.children[i].querySelectorAll("button")].slice(1)) button.hidden = !file?.frames.includes(name);
+      for (const button of [...list.children[i].querySelectorAll("button")].slice(1)) button.hidden = !file?.frames.includes(name.toUpperCase());
     });
     const on = byId("teach-on");
     const before = on.value || "WORLD";
-    on.replaceChildren(...["WORLD", ...frames].map((name) => make("option", { value: name, textContent: name })));
+    on.replaceChildren(...["WORLD", ...frames.filter((name) => file?.frames.includes(name.toUpperCase()) || name === "STATION")].map((name) => make("option", { value: name, textContent: name })));
     on.value = ["WORLD", ...frames].includes(before) ? before : "WORLD";
     followFrames(frames);
   }
