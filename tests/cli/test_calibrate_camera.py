@@ -69,7 +69,7 @@ def test_pictures_of_a_camera_beside_the_arm(scene: Scene, folder: Path, tmp_pat
     lens_errors = [value["standard_error"] for value in data["lens"].values()]
     assert np.all(np.abs(lens.numbers - scene.lens.numbers) < 5 * np.array(lens_errors))
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == 3
+    assert page.count("<figure>") == 3
     assert "http://" not in page
 
     # The corners that were written give the same, as does the lens that was written, with the corners alone.

@@ -4,6 +4,7 @@ import json
 
 from armwright.accuracy.assessment import Assessment
 from armwright.report.accuracy_figures import accuracy_drawings
+from armwright.report.elements import Card, figures, tables
 from armwright.report.static_page import static_page
 
 
@@ -23,8 +24,10 @@ def accuracy_files(assessment: Assessment, *, title: str, command: str) -> dict[
         "report.html": static_page(
             title=title,
             command=command,
-            tables=assessment.tables(),
-            drawn=drawn,
+            sections=[
+                Card("Characteristics", tables(assessment.tables(), symbols=(0,))),
+                Card("Figures", figures(drawn)),
+            ],
             notes=assessment.notes,
             verdict=("all limits hold" if good else "limit exceeded", good) if bounded else None,
         ),

@@ -4,7 +4,6 @@ Source:
     Thesis, figures 4.7, 4.8, 4.9 and 4.12.
 """
 
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,15 @@ from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_position
-from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain_axes, plain_label, svg_text
+from armwright.report.figures import (
+    Drawing,
+    empty_figure,
+    evenly_spaced,
+    plain_axes,
+    plain_label,
+    round_number,
+    svg_text,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,14 +65,6 @@ def magnification_factor(points: Array, errors: Array, share: float) -> float:
     size = float(np.ptp(points, axis=0).max())
     largest = float(np.linalg.norm(errors, axis=-1).max())
     return round_number(share * size / largest) if largest > 0 else 1.0
-
-
-def round_number(x: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20 ... that is not above x; 1 for all below."""
-    if x < 1:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(x))
-    return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
 
 
 def _draw_path(figure: "Figure", run: ClearanceRun) -> None:

@@ -13,7 +13,7 @@ from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_position
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
 from armwright.report.clearance_run_figures import magnification_factor
-from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
+from armwright.report.elements import badge, facts, figures, pairs, table, warnings as shown_warnings
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
 from armwright.report.stick_figure import thinned_rows
@@ -103,7 +103,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
         title=title,
         badge=badge(data["status"], good=run.finished),
         facts=facts(_facts(data, command)),
-        notes=shown_notes(run.notes),
+        notes=shown_warnings(run.notes),
         main=Template(asset("clearance_run.html")).substitute(
             pins=table(pins),
             targets=table(targets),
@@ -111,7 +111,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
             settings=pairs(_settings(data)),
             figures=figures(drawing for drawing in drawn if drawing.name in _STATIC_FIGURES),
         ),
-        styles=("clearance_run.css",),
+        styles=("figures.css", "clearance_run.css"),
         scripts=_SCRIPTS,
         data=animation_data(run),
         generated=f"armwright {__version__}: {command}",
