@@ -18,6 +18,7 @@ from armwright.report.stick_figure import skeleton_points
 _AXES = "xyz"
 # An error below so many standard errors may be none.
 _SIGMAS = 2.0
+_PARAMETERS = "dots with intervals of 95 %, which end at the scale; faded: below two standard errors"
 # Half the width of the scale of the errors, and its height, in units of its drawing.
 _HALF, _HEIGHT = 110, 16
 # A residual of the median length is drawn as long as this part of the size of the cloud of points.
@@ -57,7 +58,7 @@ def calibration_page(
         command=command,
         sections=[
             Card("Summary", tables(summary)),
-            Card("Parameters", _errors(assessment) + tables([fixed]), f"{fitted} identified, faded below two sigma"),
+            Card("Parameters", _errors(assessment, fixed), _PARAMETERS),
             Card("Residuals", _VIEW.format(text=_view_text(data)) + figures(drawn)),
             Card("Files", downloads(files)),
         ],
@@ -142,8 +143,11 @@ def _tiles(assessment: CalibrationAssessment) -> Iterator[Tile]:
     yield Tile(millimetres(float(held_out.max())), "largest, held out")
 
 
-def _errors(assessment: CalibrationAssessment) -> str:
-    """Return the errors as tables of lengths and angles, each with a dot and its interval on a common scale."""
+def _errors(assessment: CalibrationAssessment, fixed: ResultTable) -> str:
+    """Return the errors as tables of lengths and angles, each with a dot and its interval on a common scale.
+
+    Those that were not fitted are in a table beside the lengths.
+    """
     full = assessment.full
     is_length = full.model.is_length[list(full.identifiability.fitted)]
     blocks = []
@@ -154,8 +158,9 @@ def _errors(assessment: CalibrationAssessment) -> str:
         if not len(rows):
             continue
         values, errors, bounds = (x[rows] * factor for x in (full.values, full.standard_errors, full.intervals()))
-        scale = _upper_round(float(np.abs(bounds).max()))
         clear = np.abs(values) >= _SIGMAS * errors
+        # Errors that are hardly identifiable have intervals that hide all others; they are cut off.
+        scale = _upper_round(float(np.abs(bounds[clear] if clear.any() else bounds).max()))
         numbers = ResultTable(
             title=title,
             heads=("error", unit, "±"),
@@ -170,8 +175,11 @@ def _errors(assessment: CalibrationAssessment) -> str:
             _interval(value / scale, low / scale, high / scale)
             for value, (low, high) in zip(values.tolist(), bounds.tolist(), strict=True)
         ]
-        blocks.append(f"<div><h3>{title}</h3>{table(numbers, last=[_scale(scale, unit), *drawn])}</div>")
-    return f'<div class="tables errors">{"".join(blocks)}</div>'
+        blocks.append(f"<h3>{title}</h3>{table(numbers, last=[_scale(scale, unit), *drawn])}")
+    if fixed.rows:
+        blocks.append(f'<h3 class="next">{fixed.title}</h3>{table(fixed)}')
+    first, *others = blocks
+    return f'<div class="tables errors"><div>{first}</div><div>{"".join(others)}</div></div>'
 
 
 def _upper_round(x: float) -> float:
