@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase
 
+_Draw: TypeAlias = Callable[["Figure", Any, Any], None]
+
 # Samples of a run that are drawn, and the drawn range about a corner, relative to its round-off or the shorter leg.
 _MAX_SAMPLES, _CORNER_RANGE, _LEG_SHARE = 2000, 5.0, 0.15
 _MARKS = "osD^v"
@@ -37,7 +39,7 @@ def accuracy_drawings(assessment: Assessment) -> list[Drawing]:
     """Return the figures of an assessment, in the order of its tests."""
     drawn: list[Drawing] = []
     cloud = partial(_draw_pose_cloud, half=_cloud_half_width(assessment))
-    functions = {**_DRAWING_FUNCTIONS, PoseRepeatability: (cloud, _CLOUD_CAPTION)}
+    functions: dict[type, tuple[_Draw, str]] = {**_DRAWING_FUNCTIONS, PoseRepeatability: (cloud, _CLOUD_CAPTION)}
     for test, results in zip(assessment.tests, assessment.results, strict=True):
         title = f"{test.name}{f', {test.condition}' if test.condition else ''}"
         for result in results:
@@ -70,7 +72,8 @@ def _draw_pose_cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability
     cloud = test.clouds[0]
     points, centre = _about_commanded(cloud.positions, test), _about_commanded(result.barycentre, test)
     figure.set_size_inches(7.4, 6.4)
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.7, 1))
+    parts: Any = figure.subfigures(2, 1, height_ratios=(1.7, 1))
+    upper, lower = parts
     middle = _cloud_middle(points)
     for axis, i, j in _plane_axes(upper, test.size):
         axis.plot(points[:, i], points[:, j], "o", markersize=3.5, color="C0", label="attained")
@@ -221,7 +224,7 @@ def _axes_without_offset(figure: "Figure", x: str, y: str) -> "Axes":
 
 
 # The function that draws each other kind of result, and the caption of the figure.
-_DRAWING_FUNCTIONS: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
+_DRAWING_FUNCTIONS: dict[type, tuple[_Draw, str]] = {
     Variation: (_draw_variation, "attained positions by direction or robot, about the mean of all; barycentres filled"),
     PoseDrift: (_draw_drift, "AP and RP over time"),
     Settling: (

@@ -153,7 +153,7 @@ def _errors(assessment: CalibrationAssessment, fixed: ResultTable) -> str:
     blocks = []
     for title, unit, factor, rows in (
         ("Lengths", "mm", 1e3, np.flatnonzero(is_length)),
-        ("Angles", "deg", 180 / math.pi, np.flatnonzero(~is_length)),
+        ("Angles", "deg", 180 / math.pi, np.flatnonzero(is_length == 0)),
     ):
         if not len(rows):
             continue

@@ -32,6 +32,8 @@ _ERROR_SHARE, _MAX_POINTS = 0.2, 2500
 _SEGMENTS = 100
 # So many places of the path without play are tied to those of the same moment with it.
 _LINKS = 31
+# A label of y is read from below, so that its arrow points up.
+_UPWARDS = "y, mm \N{RIGHTWARDS ARROW}"
 # The spectrum is shown up to here [Hz].
 _MAX_FREQUENCY = 200.0
 
@@ -46,7 +48,7 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
         ("error", _draw_error, "Error of the tip over time"),
         ("spectrum", _draw_spectrum, "Amplitudes of the error: mean removed, up to 200 Hz"),
         ("forces", _draw_forces, "Forces between journals and bearings; a gap in a curve: the journal flies"),
-        ("energy", _draw_energy, "What impacts and friction have taken, and what the books lack"),
+        ("energy", _draw_energy, "Energy taken by impacts and friction, and the residual of the energy balance"),
     ):
         figure = empty_figure((7.4, 4.2))
         draw(figure, run)
@@ -82,7 +84,7 @@ def _draw_path(figure: "Figure", run: ClearanceRun) -> None:
     axis.plot(*actual.T, color="C0", linewidth=1.3, label=f"with play, error × {factor:g}")
     for k, label in ((0, "start"), (-1, "end")):
         axis.plot(*actual[k], "os"[k], color="C3", markersize=6, fillstyle="none", linestyle="", label=label)
-    axis.set(xlabel="x, mm", ylabel="y, mm")
+    axis.set(xlabel="x, mm \N{RIGHTWARDS ARROW}", ylabel=_UPWARDS)
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(visible=True, alpha=0.3)
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
@@ -108,10 +110,12 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
         axis.add_collection(lines)
         axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
         shown = (-1.12 * wall, 1.12 * wall)
-        axis.set(title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=shown, ylim=shown)
+        axis.set(
+            title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm \N{RIGHTWARDS ARROW}", xlim=shown, ylim=shown
+        )
         axis.set_aspect("equal")
         axis.grid(visible=True, alpha=0.3)
-    panels[0].set_ylabel("y, mm")
+    panels[0].set_ylabel(_UPWARDS)
     figure.colorbar(lines, ax=panels, label="time, ms", shrink=0.8)
 
 
@@ -158,7 +162,7 @@ def _draw_energy(figure: "Figure", run: ClearanceRun) -> None:
         ("lost in impacts", energy.impact_loss, "-"),
         ("lost in friction", energy.friction_loss, "--"),
         ("in the walls", energy.stored, "-."),
-        ("not explained", energy.imbalance, ":"),
+        ("residual of the balance", energy.imbalance, ":"),
     ):
         axis.plot(run.time[samples], track[: run.rows][samples], style, linewidth=1.4, label=name)
     axis.legend(fontsize="small")
