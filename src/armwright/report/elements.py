@@ -6,7 +6,10 @@ from itertools import chain, repeat
 from typing import NamedTuple
 
 from armwright.files.result_table import ResultTable
-from armwright.report.figures import Drawing
+from armwright.report.figures import Drawing, Film
+
+# A table with more columns is not beside another.
+_MANY_COLUMNS = 9
 
 
 class Tile(NamedTuple):
@@ -107,17 +110,14 @@ def _symbol(text: str) -> str:
 
 
 def tables(shown: Iterable[ResultTable], *, symbols: Collection[int] = ()) -> str:
-    """Return tables side by side, each below its title; those without rows are left out."""
-    blocks = (
-        f"<div><h3>{html.escape(result.title)}</h3>{table(result, symbols=symbols)}{_remark(result.remark)}</div>"
-        for result in shown
-        if result.rows
-    )
-    return f'<div class="tables">{"".join(blocks)}</div>'
+    """Return tables side by side, wide ones alone, each below its title; those without rows are left out."""
 
+    def block(result: ResultTable) -> str:
+        wide = ' class="wide"' * (len(result.heads) > _MANY_COLUMNS)
+        remark = f'<p class="quiet">{html.escape(result.remark)}</p>' * bool(result.remark)
+        return f"<div{wide}><h3>{html.escape(result.title)}</h3>{table(result, symbols=symbols)}{remark}</div>"
 
-def _remark(text: str) -> str:
-    return f'<p class="quiet">{html.escape(text)}</p>' if text else ""
+    return f'<div class="tables">{"".join(block(result) for result in shown if result.rows)}</div>'
 
 
 def table_cards(shown: Iterable[ResultTable]) -> list[Card]:
@@ -139,7 +139,7 @@ def _card(card: Card, identifier: str) -> str:
     return f'<section class="card" id="{identifier}" aria-label="{name}">{head}\n{card.content}</section>'
 
 
-def figures(drawn: Iterable[Drawing]) -> str:
+def figures(drawn: Iterable[Drawing | Film]) -> str:
     """Return figures, with their data."""
     return '<div id="figures">' + "\n".join(drawing.element for drawing in drawn) + "</div>"
 

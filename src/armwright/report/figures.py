@@ -1,5 +1,6 @@
 """Figures as SVG text that is identical for identical numbers: curves, bars, and parts of other figures."""
 
+import base64
 import html
 import io
 import math
@@ -38,11 +39,37 @@ class Drawing(NamedTuple):
     svg: str
 
     @property
+    def files(self) -> Mapping[str, str]:
+        """Its only file by name."""
+        return {f"{self.name}.svg": self.svg}
+
+    @property
     def element(self) -> str:
         """The figure as an element of a page, in the colours of the page."""
         caption = html.escape(self.caption)
         drawing = inline_svg(self.svg, self.name).replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)
         return f"<figure>{drawing}<figcaption>{caption}</figcaption></figure>"
+
+
+class Film(NamedTuple):
+    """A film, in one or more formats.
+
+    Attributes:
+        name: name of its files without the suffix.
+        caption: its caption.
+        files: its files by name; a GIF is among them.
+    """
+
+    name: str
+    caption: str
+    files: Mapping[str, bytes]
+
+    @property
+    def element(self) -> str:
+        """The film as an element of a page, which includes its data."""
+        caption, data = html.escape(self.caption), base64.b64encode(self.files[f"{self.name}.gif"]).decode()
+        image = f'<img src="data:image/gif;base64,{data}" alt="{caption}">'
+        return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
 def curves(
