@@ -10,7 +10,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.calibration.chain import kinematic_chain
 from armwright.kinematics.forward_kinematics import forward
-from armwright.report.calibration_page import millimetres
+from armwright.report.elements import length_text
 from cli_calls import armwright
 
 ARM = "puma560"
@@ -74,7 +74,7 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     told = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
     before, after = (told["distances"][name]["mean"] for name in ("nominal, base best-fitted", "calibrated, held out"))
     tiles = re.findall(r'<li class="figure"><b>([^<]*)</b>', page)
-    assert tiles[:2] == [millimetres(before), f"→ {millimetres(after)}"]
+    assert tiles[:2] == [length_text(before), f"→ {length_text(after)}"]
     assert before > 20 * after
     # A plain fact is no warning, and what lies beside the page is linked.
     assert '<li class="warning">' not in page

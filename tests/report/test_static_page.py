@@ -5,7 +5,7 @@ import re
 import pytest
 
 from armwright.files.result_table import ResultTable
-from armwright.report.elements import Card, Tile, downloads, figures, pairs, table, table_cards
+from armwright.report.elements import Card, Tile, downloads, figures, length_text, pairs, table, table_cards
 from armwright.report.figures import Drawing
 from armwright.report.static_page import static_page
 
@@ -115,6 +115,14 @@ def test_symbols_and_a_drawn_column() -> None:
     assert "<td>AP_x</td>" in table(shown)
     text = table(shown, last=["<i>scale</i>", "<svg>1</svg>", "<svg>2</svg>"])
     assert re.findall(r'<t[hd] class="drawn">(.*?)</t[hd]>', text) == ["<i>scale</i>", "<svg>1</svg>", "<svg>2</svg>"]
+
+
+@pytest.mark.parametrize(
+    ("x", "text"),
+    [(0.01082, "10.82 mm"), (5.04e-5, "0.050 mm"), (9.99e-6, "9.99 µm"), (2e-9, "0.002 µm"), (0.0, "0 µm")],
+)
+def test_lengths(x: float, text: str) -> None:
+    assert length_text(x) == text
 
 
 def test_rows_fit_heads() -> None:

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.calibration.assessment import CalibrationAssessment
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.forward_kinematics import link_poses
-from armwright.report.elements import Card, Tile, downloads, figures, table, tables
+from armwright.report.elements import Card, Tile, downloads, figures, length_text, table, tables
 from armwright.report.figures import Drawing, round_number
 from armwright.report.static_page import static_page
 from armwright.report.stick_figure import skeleton_points
@@ -76,12 +76,6 @@ def calibration_page(
     )
 
 
-def millimetres(x: float) -> str:
-    """Return a distance [m] as text in mm: with two decimals, smaller ones with two or three digits."""
-    x *= 1e3
-    return f"{x:.{2 if x >= 1 else 3 if x >= 0.01 else 5}f} mm"
-
-
 def residual_view(assessment: CalibrationAssessment) -> dict[str, Any]:
     """Return the data of the view of the residuals, in the best-fitted base frame of the nominal arm.
 
@@ -105,7 +99,7 @@ def residual_view(assessment: CalibrationAssessment) -> dict[str, Any]:
     return {
         "points": points.tolist(),
         "arrows": [(factor * vectors[i] @ R).tolist() if i in vectors else None for i in range(len(measured))],
-        "said": [f"{name}: {millimetres(length)}" for name, length in zip(names, lengths.tolist(), strict=True)],
+        "said": [f"{name}: {length_text(length)}" for name, length in zip(names, lengths.tolist(), strict=True)],
         "marked": list(assessment.remarkable),
         "arm": skeleton_points(assessment.arm, link_poses(assessment.arm, measured.q[:1]))[0].tolist(),
         "factor": factor,
@@ -138,9 +132,9 @@ def _tiles(assessment: CalibrationAssessment) -> Iterator[Tile]:
     ):
         if name in kinds:
             arrow = "" if name.startswith("nominal") else "\N{RIGHTWARDS ARROW} "
-            yield Tile(f"{arrow}{millimetres(float(kinds[name].mean()))}", text)
+            yield Tile(f"{arrow}{length_text(float(kinds[name].mean()))}", text)
     held_out = kinds["non-geometric, held out" if "non-geometric, held out" in kinds else "calibrated, held out"]
-    yield Tile(millimetres(float(held_out.max())), "largest, held out")
+    yield Tile(length_text(float(held_out.max())), "largest, held out")
 
 
 def _errors(assessment: CalibrationAssessment, fixed: ResultTable) -> str:

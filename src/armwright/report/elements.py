@@ -40,6 +40,13 @@ class Card(NamedTuple):
     remark: str = ""
 
 
+def length_text(x: float) -> str:
+    """Return a length [m] as text: in mm with two or three decimals, small ones in µm."""
+    if x < 1e-5:
+        return f"{x * 1e6:.3g} µm"
+    return f"{x * 1e3:.{2 if x >= 1e-3 else 3}f} mm"
+
+
 def badge(text: str, *, good: bool) -> str:
     """Return the status beside the heading."""
     return f'<span id="status" class="badge{" good" if good else ""}">{html.escape(text)}</span>'
