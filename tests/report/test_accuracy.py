@@ -2,6 +2,7 @@
 
 import html
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -122,3 +123,21 @@ def test_poses_are_drawn_on_one_scale(everything: Assessment, monkeypatch: pytes
     trend, histogram = drawn[0].axes[2:]
     assert len(trend.lines[0].get_ydata()) == len(cloud.positions)
     assert sum(bar.get_width() for bar in histogram.patches) == len(cloud.positions)
+
+
+@pytest.mark.browser
+def test_page_on_a_phone(browser: Any, everything: Assessment, tmp_path: Path) -> None:
+    """On a phone nothing is wider than the screen, and the values of all measures are seen without scrolling."""
+    file = tmp_path / "report.html"
+    files = accuracy_files(everything.with_limits({"AP": 1e-3}), title="A", command="a")
+    file.write_text(files["report.html"], encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(file.as_uri())
+
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    rights = page.evaluate(
+        "[...document.querySelectorAll('td:nth-child(3)')].map(td => td.getBoundingClientRect().right)"
+    )
+    assert len(rights) == len(everything.measures)
+    assert max(rights) <= 390
+    page.close()
