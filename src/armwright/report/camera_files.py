@@ -25,7 +25,6 @@ _BESIDE = {
     "camera.toml": "lines of a cell file: the camera with its lens and its pose",
     "errors.json": "all numbers with standard errors and intervals",
     "corners.csv": "the corners in the pictures",
-    "residuals.svg": "the residuals of the corners",
 }
 # The longer side of a picture that is shown [px].
 _LONGEST = 800
@@ -67,7 +66,7 @@ def camera_files(
             sections=[
                 Card("Numbers", tables(calibration.tables())),
                 Card("Residuals", figures(drawn)),
-                Card("Files", downloads(_BESIDE)),
+                Card("Files", downloads(_BESIDE | {f"{one.name}.svg": one.caption for one in drawn})),
             ],
             numbers=_tiles(calibration),
             notes=[note for note in calibration.notes if note not in calibration.warnings],
@@ -89,7 +88,7 @@ def _tiles(calibration: CameraCalibration) -> Iterator[Tile]:
     if alone is not None:
         yield Tile(f"{alone.sigma:.3g} px", "standard deviation of a coordinate of a corner")
     if fit is not None:
-        yield Tile(f"{fit.disagreement:.2f}", "disagreement of pictures and arm, of what their accuracy explains")
+        yield Tile(f"{fit.disagreement:.2f} x", "as far from the arm as its accuracy and the noise explain")
     yield Tile(f"{calibration.lens.numbers[0]:.1f} px", "focal length along x")
 
 
