@@ -32,7 +32,7 @@ def test_parts_in_order() -> None:
     """The page has its numbers, then its sections in order with links to them, and says what made it."""
     drawn = [Drawing("one", "A picture", SVG), Drawing("two", "Another", SVG)]
     tables = table_cards([ResultTable(title=name, heads=("x",), rows=[("1",)]) for name in ("First", "Second")])
-    text = page(sections=[*tables, Card("Figures", figures(drawn))], numbers=[Tile("0.05 mm", "held out", "warn")])
+    text = page(sections=[*tables, Card("Figures", figures(drawn))], numbers=[Tile("0.05 mm", "held out", mark="warn")])
 
     assert cards(text) == ["First", "Second", "Figures"]
     assert re.findall(r'<a href="#(part-\d)">', text) == ["part-1", "part-2", "part-3"]

@@ -60,4 +60,4 @@ def _tiles(assessment: Assessment) -> Iterator[Tile]:
         few = f"; {measure.displayed_cycles} cycles" if measure.few else ""
         mark = "bad" if measure.holds is False else "warn" if measure.few else ""
         label = f"{measure.symbol}, {measure.what}, of {measure.name}{of}{limit}{few}"
-        yield Tile(f"{measure.rounded(decimals)} {measure.displayed_unit}", label, mark)
+        yield Tile(f"{measure.rounded(decimals)} {measure.displayed_unit}", label, mark=mark)

@@ -184,7 +184,7 @@ def _tiles(run: ClearanceRun, data: Mapping[str, Any]) -> Iterator[Tile]:
     if run.predictability is not None:
         certain = run.predictability.to_the_end
         until = "to the end" if certain else f"until {data['predictable_until'] * 1e3:.4g} ms"
-        yield Tile(until, "predictable", "" if certain else "warn")
+        yield Tile(until, "predictable", mark="" if certain else "warn")
 
 
 def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:

@@ -18,11 +18,13 @@ class Tile(NamedTuple):
     Attributes:
         value: the number with its unit.
         label: what it is.
+        title: more about it.
         mark: ``warn`` or ``bad`` where it needs attention, else empty.
     """
 
     value: str
     label: str
+    title: str = ""
     mark: str = ""
 
 
@@ -71,12 +73,14 @@ def remarks(texts: Iterable[str]) -> str:
 
 def headline(tiles: Iterable[Tile]) -> str:
     """Return the numbers that a page is about; empty where there are none."""
-    shown = "".join(
-        f'<li class="{f"figure {tile.mark}".rstrip()}">'
-        f"<b>{html.escape(tile.value)}</b><small>{html.escape(tile.label)}</small></li>"
-        for tile in tiles
-    )
+    shown = "".join(map(_item, tiles))
     return f'<ul class="headline" aria-label="In short">{shown}</ul>' if shown else ""
+
+
+def _item(tile: Tile) -> str:
+    title = f' title="{html.escape(tile.title)}"' if tile.title else ""
+    name = f"figure {tile.mark}".strip()
+    return f'<li class="{name}"{title}><b>{html.escape(tile.value)}</b><small>{html.escape(tile.label)}</small></li>'
 
 
 def pairs(named: Iterable[tuple[str, str]]) -> str:

@@ -87,9 +87,11 @@ class PumaMoves:
     def headline(self) -> Iterator[Tile]:
         """Give by how much each move must run slower, and how many Cartesian moves are stopped."""
         for row in self.moves:
-            yield Tile(f"{row.slower:.1f} x", f"slower within the limits: {row.name}", "warn" if row.slower > 1 else "")
+            yield Tile(
+                f"{row.slower:.1f} x", f"slower within the limits: {row.name}", mark="warn" if row.slower > 1 else ""
+            )
         stopped = sum(bool(row.stopped) for row in self.moves)
-        yield Tile(f"{stopped} of {len(self.moves)}", "moves meet a stop of a joint", "bad" if stopped else "")
+        yield Tile(f"{stopped} of {len(self.moves)}", "moves meet a stop of a joint", mark="bad" if stopped else "")
 
     def figures(self) -> list[Drawing | Film]:
         """Return the project's figures, the last one as a film."""

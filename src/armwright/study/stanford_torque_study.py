@@ -79,13 +79,13 @@ class StanfordTorque:
         agreeing = sum(row.verdict == "agrees" for row in printed)
         yield Tile(f"{agreeing} of {len(printed)}", "printed constants agree")
         wrong = sum(row.verdict == "wrong" for row in printed)
-        yield Tile(str(wrong), "printed constants are wrong", "warn" if wrong else "")
+        yield Tile(str(wrong), "printed constants are wrong", mark="warn" if wrong else "")
         worst = max(self.joints, key=lambda row: row.bejczy)
         yield Tile(f"{worst.bejczy * 100:.0f} %", f"largest error of Bejczy's model, joint {worst.joint}")
         loaded = max(self.joints, key=lambda row: row.peak_loaded / row.limit)
         share = loaded.peak_loaded / loaded.limit
         label = f"of what its motor gives, joint {loaded.joint} with the largest load"
-        yield Tile(f"{share * 100:.0f} %", label, "bad" if share > 1 else "")
+        yield Tile(f"{share * 100:.0f} %", label, mark="bad" if share > 1 else "")
 
     def figures(self) -> list[Drawing]:
         """Return figures 3 to 11."""
