@@ -12,6 +12,7 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.files.inputs import read_program
 from armwright.kinematics.forward_kinematics import forward
+from armwright.physics.world import PhysicsCell
 from armwright.program.api import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.studio.cell_file import CellFile
@@ -409,6 +410,29 @@ def test_what_a_camera_sees() -> None:
     assert pictures[0] != pictures[1]
     studio.receive(json.dumps({"do": "look", "camera": "TPO"}), 1, 0.0)
     assert "no camera" in studio.state(1)["refusal"]
+
+
+def test_a_run_with_physics() -> None:
+    """Parts are shown where they are in the world, and measured beside planned."""
+    pytest.importorskip("cv2")
+    file = CellFile(EXAMPLES / "vision_cell.toml")
+    studio = Studio(Project(Workbench(file.cell), file, EXAMPLES / "stack_by_vision.rlo"))
+    studio.workbench.warm_up()
+    studio.page_opened(1)
+    studio.receive(json.dumps({"do": "run", "physics": True, "rate": 4}), 1, 0.0)
+    for k in range(60):
+        studio.tick(k / 20, 1 / 20)
+    run = studio.project.run
+    assert run is not None
+    state, hardware = studio.state(1), run._computed.machine.hardware
+    assert isinstance(hardware, PhysicsCell)
+    assert state["picture"]["found"]
+    motion = state["run"]["motions"]["ARM_1"]
+    np.testing.assert_allclose(motion["q_measured"], motion["q"], atol=1e-2)
+    np.testing.assert_allclose(studio.workbench.arms["ARM_1"].q, motion["q_measured"], atol=1e-5)
+    tracks = hardware.observations().parts
+    for name, X in studio.workbench.part_poses().items():
+        np.testing.assert_allclose(X, tracks[name].at(run.time)[1], atol=1e-9)
 
 
 def test_a_process_steps(tmp_path: Path) -> None:

@@ -97,8 +97,10 @@ class ProgramRun:
         self.time, self.playing, self.rate = 0.0, False, 1.0
         self._cell, self._executor = cell, executor
         self._computing: Future[None] | None = None
-        # What is to be done as soon as nothing is computed, and whether what is shown leaps to where that leads.
-        self._tasks: deque[Callable[[], None]] = deque()
+        # Commands to be carried out as soon as nothing is computed, and whether one of them is being carried out.
+        self._commands: deque[Callable[[], None]] = deque()
+        self._commanded = False
+        # Whether what is shown leaps to where the program stands, and whether anything has become known.
         self._leaps = self._news = False
         self._happened = ShownEffects()
         self._paths: dict[str, tuple[tuple[int, ...], list[list[float]]]] = {}
@@ -145,8 +147,7 @@ class ProgramRun:
         if process and process not in names:
             raise UnknownNameError("process", process, names)
         # A step back ends before what is shown.
-        self._leaps = step == "back"
-        self.playing = True
+        self.playing = step != "back"
         self._do(lambda: self._resume(step, process))
 
     def pause(self) -> None:
@@ -158,11 +159,12 @@ class ProgramRun:
         """Let time go by [s]; return whether anything has changed."""
         self._compute()
         changed, self._news = self._news, False
-        if not self.playing or self._leaps:
+        # Time stands while the program goes to where a command leads it.
+        if not self.playing or self._commanded or self._commands:
             return changed
         before = self.time
         self.time = max(before, min(before + seconds * self.rate, self.end))
-        if self.time >= self.end and not self._computed.running and self._computing is None and not self._tasks:
+        if self.time >= self.end and not self._computed.running and self._computing is None:
             self.playing = False
             return True
         return changed or self.time != before
@@ -175,18 +177,20 @@ class ProgramRun:
             task()
             self._take()
         else:
-            self._tasks.append(task)
+            self._commands.append(task)
 
     def _compute(self) -> None:
         """Take what has been computed, and let the rest be computed."""
         if self._computing is not None:
             if not self._computing.done():
                 return
-            computing, self._computing = self._computing, None
-            computing.result()
-            self._take()
-        if self._tasks:
-            task = self._tasks.popleft()
+            computing, self._computing, self._commanded = self._computing, None, False
+            try:
+                computing.result()
+            finally:
+                self._take()
+        if self._commands:
+            task, self._commanded = self._commands.popleft(), self._executor is not None
         elif self._debugger.running and self.end < self.time + _AHEAD:
             task = self._run_on
         else:
@@ -200,8 +204,8 @@ class ProgramRun:
     def _take(self) -> None:
         """Show from now on what has been computed."""
         self._computed, self._news = self._compute_view(), True
-        if self._leaps and not self._computed.running:
-            self._leaps, self.time, self.playing = False, self._computed.end, False
+        if self._leaps:
+            self._leaps, self.time = False, self._computed.end
 
     def _compute_view(self) -> _Computed:
         debugger = self._debugger
@@ -239,6 +243,7 @@ class ProgramRun:
         debugger.resume(command, named[0] if named else path)
         if step == "back":
             debugger.run_slice()
+            self._leaps = True
 
     def _take_lines(self, lines: Iterable[int]) -> None:
         debugger = self._debugger
