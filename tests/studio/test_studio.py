@@ -432,7 +432,7 @@ def test_a_run_with_physics() -> None:
     np.testing.assert_allclose(studio.workbench.arms["ARM_1"].q, motion["q_measured"], atol=1e-5)
     tracks = hardware.observations().parts
     for name, X in studio.workbench.part_poses().items():
-        np.testing.assert_allclose(X, tracks[name].at(run.time)[1], atol=1e-9)
+        np.testing.assert_allclose(X, tracks[name].at(run.time + 1e-9)[1], atol=1e-9)
 
 
 def test_a_process_steps(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -102,11 +103,9 @@ class Log:
 
     def tracks(self) -> dict[str, PartTrack]:
         """Return where the parts were."""
-        return {
-            name: PartTrack(
-                times=tuple(time for time, _ in track),
-                arms=(None,) * len(track),
-                poses=tuple(X for _, X in track),
-            )
-            for name, track in self._tracks.items()
-        }
+        return {name: _part_track(track) for name, track in self._tracks.items()}
+
+
+def _part_track(rows: Sequence[tuple[float, Array]]) -> PartTrack:
+    times, poses = zip(*rows, strict=True)
+    return PartTrack(times=times, arms=(None,) * len(rows), poses=poses)

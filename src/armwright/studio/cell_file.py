@@ -36,24 +36,31 @@ class CellFile:
 
     Attributes:
         path: of the file.
+        named: whether the file has a name; otherwise the path is a suggestion.
         text: with the changes.
         cell: as the text describes it.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read a file.
+    def __init__(self, path: Path, text: str | None = None) -> None:
+        """Read a file, or begin one.
+
+        Args:
+            path: of the file.
+            text: of a file that is not there yet, and has no name.
 
         Raises:
             FileFormatError: it is no cell file.
         """
-        self.path, self.cell = path, read_cell(path)
-        self.text = self._saved = read_text(path)
+        self.path, self.named = path, text is None
+        self.text = read_text(path) if text is None else text
+        self._saved = self.text if text is None else ""
+        self.cell = read_cell(path) if text is None else parse_cell(path, text)
         self._before: list[str] = []
 
     @property
     def changed(self) -> bool:
-        """Whether the text differs from the file."""
-        return self.text != self._saved
+        """Whether the text differs from the file; of one that is not there, whether anything has been taught."""
+        return self.text != self._saved if self.named else bool(self._before)
 
     # ---- changes -------------------------------------------------------------------------------------------------
 
@@ -142,7 +149,7 @@ class CellFile:
 
     def difference(self) -> str:
         """Return what saving would change in the file, as a unified diff; empty where it is nothing."""
-        if self.text == self._saved:
+        if not self.changed:
             return ""
         before, after = (text.splitlines(keepends=True) for text in (self._saved, self.text))
         return "".join(difflib.unified_diff(before, after, self.path.name, f"{self.path.name}, taught"))

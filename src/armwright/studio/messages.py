@@ -58,7 +58,7 @@ class MoveTool:
 
 @attrs.frozen(kw_only=True)
 class Jog:
-    """Move an arm steadily, until a moment after the latest of these messages.
+    """Move an arm steadily, until a moment after the latest of these messages; or by one step.
 
     Attributes:
         arm: name of the arm.
@@ -66,6 +66,8 @@ class Jog:
         axis: from 0: a joint; or x, y, z, then the rotations about them.
         sign: 1 or -1.
         share: of the full jogging speed, above 0 to 1.
+        length: of one step along an axis or of a sliding joint [m]; 0 for steady motion.
+        angle: of one step about an axis or of a revolute joint [rad]; 0 for steady motion.
     """
 
     arm: str
@@ -73,6 +75,8 @@ class Jog:
     axis: int
     sign: Literal[1, -1]
     share: float
+    length: float = 0.0
+    angle: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -158,9 +162,15 @@ class Unteach:
 
 @attrs.frozen(kw_only=True)
 class Save:
-    """Write the cell file or the program."""
+    """Write the cell file or the program; under a name in the working folder where it has none yet."""
 
     what: Literal["cell", "program"]
+    name: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Reload:
+    """Take the program as its file has it now; what has been changed since is lost."""
 
 
 @attrs.frozen(kw_only=True)
@@ -196,11 +206,13 @@ class InsertMove:
         approach: length of the straight line along the z axis of the goal that ends there [m]; 0 for none.
         departure: length of the straight line against the z axis of the tool by which it begins [m]; 0 for none.
         speed: 100 being normal.
+        teach: whether the frame is taught; otherwise the MOVE goes to where it is already.
     """
 
     arm: str
     frame: str
     line: int
+    teach: bool = True
     straight: bool = False
     approach: float = 0.0
     departure: float = 0.0
@@ -374,6 +386,7 @@ Command: TypeAlias = (
     | Forget
     | Unteach
     | Save
+    | Reload
     | GoTo
     | SetText
     | InsertMove
@@ -413,6 +426,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "forget": Forget,
     "unteach": Unteach,
     "save": Save,
+    "reload": Reload,
     "go to": GoTo,
     "text": SetText,
     "insert": InsertMove,

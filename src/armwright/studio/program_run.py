@@ -257,7 +257,9 @@ class ProgramRun:
         stop, source = debugger.stop, debugger.machine.code.source
         if stop is not None and stop.reason == "end":
             return ()
-        stands = [(process, debugger.stack(process.path)[0]) for process in debugger.processes]
+        # A process that waits for its branches is in no line.
+        waits = [it for it in debugger.processes if it.waiting is None or it.waiting.kind != "branches"]
+        stands = [(process, debugger.stack(process.path)[0]) for process in waits]
         return tuple(
             {
                 "process": frame.title,

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
+from armwright.files.inputs import read_program
 from armwright.files.output import write_back
 from armwright.program.api import Compilation, compile as compile_program, import_reader
 from armwright.program.flow_analysis.side_effects import walk_statements
@@ -179,9 +180,21 @@ class ProgramText:
             OutputError: the file cannot be written, or somebody else has changed it meanwhile.
         """
         if self.path is None:
-            raise ProgramTextError("the program has no file; name one on the command line")
+            raise ProgramTextError("the program has no file yet; give it a name")
         write_back(self.path, self._saved, self.text, "program_mb")
         self._saved = self.text
+
+    def reload(self) -> None:
+        """Take the text that the file has now.
+
+        Raises:
+            ProgramTextError: it has no file.
+            FileFormatError: the file cannot be read.
+        """
+        if self.path is None:
+            raise ProgramTextError("the program has no file yet; give it a name")
+        self._saved = read_program(self.path)
+        self.replace(self._saved)
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 
@@ -359,6 +372,7 @@ class ProgramText:
         return {
             "version": self.version,
             "name": self.name,
+            "named": self.path is not None,
             "changed": self.changed,
             "runs": self.compiled.code is not None,
             "diagnostics": self._diagnostics,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
@@ -11,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.errors import UnknownNameError
+from armwright.errors import UnknownNameError, shown
 from armwright.files.inputs import read_program
 from armwright.physics.camera_view import CameraView
 from armwright.physics.kinematic_cell import kinematic_cell
@@ -24,6 +25,8 @@ from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextErro
 from armwright.studio.workbench import Workbench
 
 _MOST_BREAKPOINTS = 1000
+# Names of files that pages may ask for: none leads out of the working folder.
+_FILE = re.compile(r"\w[\w-]{0,80}(\.\w{1,5})?", re.ASCII)
 
 
 class Project:
@@ -113,18 +116,50 @@ class Project:
         file.undo()
         self._taught(file)
 
-    def save(self, what: str) -> None:
-        """Write the ``cell`` file or the ``program``."""
-        if what == "cell":
-            self._teachable().save()
-        else:
-            self.program.save()
+    def save(self, what: str, name: str = "") -> None:
+        """Write the ``cell`` file or the ``program``.
 
-    def insert_move(self, arm: str, frame: str, line: int, form: MoveForm) -> None:
-        """Teach a frame where the tool is, and insert a MOVE to it behind a line; both or neither."""
+        Args:
+            what: which.
+            name: of the file, in the working folder, where it has none yet.
+
+        Raises:
+            TeachingError: it has no name, or a file of this name is there already.
+            OutputError: it cannot be written, or somebody else has changed it meanwhile.
+        """
+        if what == "program":
+            self.program.path = self.program.path or _new_path(name, ".rlo")
+            self.program.save()
+            return
+        file = self._teachable()
+        if not file.named:
+            file.path, file.named = _new_path(name, ".toml"), True
+        file.save()
+
+    def unsaved(self) -> list[str]:
+        """Return the names of the files whose changes have not been written."""
+        texts = [(self.program.name, self.program.changed and bool(self.program.text.strip()))]
+        if self.file is not None:
+            texts.append((self.file.path.name, self.file.changed))
+        return [name for name, changed in texts if changed]
+
+    def insert_move(self, arm: str, frame: str, line: int, form: MoveForm, *, teach: bool) -> None:
+        """Insert a MOVE to a frame behind a line, and teach the frame where the tool is; both or neither.
+
+        Args:
+            arm: name of the arm.
+            frame: name of the frame.
+            line: from 1; see ``ProgramText.insert_move``.
+            form: of the MOVE.
+            teach: whether the frame is taught; otherwise it is one that there is.
+        """
         form.clauses(arm, frame)
+        self.workbench.arm(arm)
         self.program.require_statements()
-        self.teach(arm, frame)
+        if teach:
+            self.teach(arm, frame)
+        elif frame.upper() not in self.workbench.cell.tree():
+            raise UnknownNameError("frame", frame, self.workbench.cell.frames)
         before = self.program.text
         self.program.insert_move(line, arm, frame.upper(), form)
         self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
@@ -274,8 +309,23 @@ class Project:
         if self.file is None:
             return None
         frames = list(self.file.cell.frames)
-        return {"name": self.file.path.name, "change": self.file.difference(), "frames": frames}
+        name, named = self.file.path.name, self.file.named
+        return {"name": name, "named": named, "change": self.file.difference(), "frames": frames}
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of it beside its files, as plain data."""
         return {"run": None if self.run is None else self.run.state(), "devices": self._device_states()}
+
+
+def _new_path(name: str, suffix: str) -> Path:
+    """Return the path of a file in the working folder that is to be made.
+
+    Raises:
+        TeachingError: the name is none, or a file of this name is there already.
+    """
+    if not _FILE.fullmatch(name):
+        raise TeachingError(f"a file name has letters, digits, - and _, got {shown(name)}")
+    path = Path(name if name.lower().endswith(suffix) else f"{name}{suffix}")
+    if path.exists():
+        raise TeachingError(f"{path} exists already; give another name")
+    return path

@@ -16,6 +16,7 @@ from armwright.studio.downloads import download
 from armwright.studio.messages import MessageError, read_message
 from armwright.studio.program_text import MoveForm
 from armwright.studio.project import Project
+from armwright.studio.workbench import SLIDING, TURNING
 
 # Jogging stops so long after the latest message that keeps it going [s].
 _JOG_TIMEOUT = 0.25
@@ -91,6 +92,7 @@ class Studio:
             self._check(command, page)
             self._do_moving(command, page, now)
             self._do_teaching(command)
+            self._do_saving(command)
             self._do_running(command, page)
             self._answer(command, page)
             self._refusals.pop(page, None)
@@ -101,8 +103,12 @@ class Studio:
     def _check(self, command: m.Command, page: int) -> None:
         if page != self.control.page and not isinstance(command, m.AskForControl):
             raise MessageError("another page has control; ask for it")
-        if self.project.run is not None and isinstance(command, _NOT_IN_A_RUN):
-            raise MessageError("the program runs; stop it first")
+        run = self.project.run
+        if run is not None and isinstance(command, _NOT_IN_A_RUN):
+            if run.stop is None or not run.stop.has_ended:
+                raise MessageError("the program runs; stop it first")
+            # What has ended makes way for what comes next.
+            self.project.run = None
         if not self.workbench.ready:
             raise MessageError("the equations of the arm are being compiled; a moment, please")
 
@@ -121,7 +127,11 @@ class Studio:
                 bench.arm(command.arm)
                 if not 0 < command.share <= 1:
                     raise MessageError(f"jog.share: expected above 0 to 1, got {command.share:g}")
-                self._jog, self._jog_until = command, now + _JOG_TIMEOUT
+                if command.length or command.angle:
+                    length, angle = (command.sign * value for value in (command.length, command.angle))
+                    bench.jog(command.arm, command.frame, command.axis, length, angle, now)
+                else:
+                    self._jog, self._jog_until = command, now + _JOG_TIMEOUT
             case m.Halt():
                 self._jog = None
             case m.Operate():
@@ -155,15 +165,20 @@ class Studio:
                 project.forget(command.name)
             case m.Unteach():
                 project.take_back()
-            case m.Save():
-                project.save(command.what)
             case m.InsertMove():
                 form = MoveForm(command.straight, command.approach, command.departure, command.speed)
-                project.insert_move(command.arm, command.frame, command.line, form)
+                project.insert_move(command.arm, command.frame, command.line, form, teach=command.teach)
             case m.InsertVia():
                 project.insert_via(command.arm, command.frame, command.line, command.blend)
             case m.TouchUp():
                 project.touch_up(command.line)
+
+    def _do_saving(self, command: m.Command) -> None:
+        match command:
+            case m.Save():
+                self.project.save(command.what, command.name)
+            case m.Reload():
+                self.project.program.reload()
 
     def _answer(self, command: m.Command, page: int) -> None:
         """Answer what a page asks for that changes nothing."""
@@ -227,7 +242,8 @@ class Studio:
             return changed
         jog = self._jog
         try:
-            self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.sign * jog.share * seconds, now)
+            full = jog.sign * jog.share * seconds
+            self.workbench.jog(jog.arm, jog.frame, jog.axis, full * SLIDING, full * TURNING, now)
         except ArmwrightError as error:
             self.refuse(self.control.page, error)
         return True

@@ -14,6 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell, base_name
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import UnknownNameError
+from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.physics.collisions import CellCollisions
 from armwright.physics.configuration_checks import ConfigurationChecks, NearBodies
 from armwright.spatial.poses import from_noap, homogeneous, to_noap
@@ -23,7 +24,9 @@ from armwright.studio.program_run import ProgramRun
 from armwright.studio.reach_map import Plane, ReachMap
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
-_TURNING, _SLIDING = math.radians(45.0), 0.25
+TURNING, SLIDING = math.radians(45.0), 0.25
+# One step of a jog is no longer [m], [rad].
+_LONGEST_STEP = 0.1, math.radians(30.0)
 # Bodies nearer than this are reported [m].
 _NEAR = 0.02
 # Changes that can be taken back at most.
@@ -85,12 +88,19 @@ class Workbench:
     # ---- moving --------------------------------------------------------------------------------------------------
 
     def set_joint(self, name: str, joint: int, value: float, now: float) -> None:
-        """Bring a joint, from 1, to a position [rad] or [m], as far as its limits allow."""
+        """Bring a joint, from 1, to a position [rad] or [m].
+
+        Raises:
+            UnreachableError: there is no such joint, or the position is beyond its limits.
+        """
         arm = self.arm(name)
         if not 1 <= joint <= len(arm.q):
             raise UnreachableError(f"{name} has joints 1 to {len(arm.q)}, got {joint}")
         q = arm.q.copy()
         q[joint - 1] = value
+        beyond = [it for it in violations_of(arm.placed.arm, q.tolist()) if it.joint == joint]
+        if beyond:
+            raise UnreachableError(str(beyond[0]))
         before = arm.q
         arm.set_joints(q)
         self._changed(arm, before, f"joint {joint}", now)
@@ -101,35 +111,42 @@ class Workbench:
         arm.move_tool(from_noap(pose), leaping=leaping)
         self._changed(arm, before, "tool", now)
 
-    def jog(self, name: str, frame: str, axis: int, step: float, now: float) -> None:
-        """Move an arm by a part of its full jogging speed times a time.
+    def jog(  # noqa: PLR0917 - a jog depends on all of this
+        self, name: str, frame: str, axis: int, length: float, angle: float, now: float
+    ) -> None:
+        """Move an arm by a length or by an angle, as the axis is.
 
         Args:
             name: of the arm.
             frame: ``JOINT``, or whose axes are meant: ``BASE``, ``TOOL``, ``WORLD`` or a frame.
             axis: from 0: a joint; or x, y, z, then the rotations about them, through the tool.
-            step: share of the full speed times time [s], with its sign.
+            length: along an axis, or of a sliding joint, with its sign [m].
+            angle: about an axis, or of a revolute joint, with its sign [rad].
             now: the time [s].
+
+        Raises:
+            UnreachableError: there is no such axis, the step is too long, or the arm cannot go there.
         """
+        if abs(length) > _LONGEST_STEP[0] or abs(angle) > _LONGEST_STEP[1]:
+            raise UnreachableError("a step is at most 100 mm or 30 deg")
         arm = self.arm(name)
         if frame == "JOINT":
             if not 0 <= axis < len(arm.q):
                 raise UnreachableError(f"{name} has {len(arm.q)} joints, got number {axis + 1}")
             revolute = arm.placed.arm.joints[axis].revolute
-            value = arm.q[axis] + step * (_TURNING if revolute else _SLIDING)
-            if not arm.lower[axis] <= value <= arm.upper[axis] and np.isclose(
-                arm.q[axis], np.clip(value, arm.lower[axis], arm.upper[axis])
-            ):
+            value = arm.q[axis] + (angle if revolute else length)
+            within = float(np.clip(value, arm.lower[axis], arm.upper[axis]))
+            if within != value and np.isclose(arm.q[axis], within):
                 raise UnreachableError(f"joint {axis + 1} is at its limit")
-            self.set_joint(name, axis + 1, float(value), now)
+            self.set_joint(name, axis + 1, within, now)
             return
         if not 0 <= axis < 6:
             raise UnreachableError(f"axes are numbered from 0 to 5, got {axis}")
         X, along, before = arm.tool, self._axes(arm, frame)[:, axis % 3], arm.q
         if axis < 3:
-            X = homogeneous(X[:3, :3], X[:3, 3] + step * _SLIDING * along)
+            X = homogeneous(X[:3, :3], X[:3, 3] + length * along)
         else:
-            X = homogeneous(rotation_from_vector(step * _TURNING * along) @ X[:3, :3], X[:3, 3])
+            X = homogeneous(rotation_from_vector(angle * along) @ X[:3, :3], X[:3, 3])
         arm.move_tool(X)
         self._changed(arm, before, f"jog {frame} {axis}", now)
 

@@ -83,9 +83,12 @@ function showEditor(state) {
     editor.version = program.version;
   }
   if (program.version === editor.version && !editor.timer) editor.problems = program.diagnostics;
-  byId("program-name").textContent = program.name + (program.changed ? ", not saved" : "");
+  byId("program-name").textContent = program.name + (program.changed ? " *" : "");
+  byId("program-name").title = program.changed ? "not saved" : "saved";
+  byId("reload").hidden = !program.named || !program.changed;
+  byId("reload").disabled = !mine();
   byId("save-program").disabled = !mine() || !program.changed;
-  byId("text").readOnly = Boolean(run) || !mine();
+  byId("text").readOnly = Boolean(run && !run.ended) || !mine();
   const breakpoints = new Set(program.breakpoints);
   const key = JSON.stringify([program.version, program.diagnostics, byId("text").value.length]);
   if (key !== editor.key) {
@@ -168,9 +171,10 @@ function startEditor() {
     byId("colours").scrollLeft = field.scrollLeft;
   };
   field.addEventListener("scroll", follow);
+  byId("reload").addEventListener("click", () => send({ do: "reload" }));
   byId("save-program").addEventListener("click", () => {
     if (editor.timer) sendText();
-    send({ do: "save", what: "program" });
+    save("program");
   });
   paintText();
 }

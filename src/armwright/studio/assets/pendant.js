@@ -16,6 +16,12 @@ function holdButton(text, label, message) {
     button.focus({ preventScroll: true });
     holding.button = button;
     button.classList.add("held");
+    const size = Number(byId("jog-step").value);
+    if (size) {
+      // One step for a press; a key that is held down makes no more.
+      send({ do: "jog", arm: chosenArm().name, share: 1, length: size / MILLIMETRES, angle: (size * Math.PI) / 180, ...message() });
+      return;
+    }
     const go = () => send({ do: "jog", arm: chosenArm().name, share: share(), ...message() }, "jog");
     go();
     holding.timer = setInterval(go, HELD_AGAIN);
@@ -55,8 +61,10 @@ function sliderRow(joint, j) {
   slider.addEventListener("input", () => set(Number(slider.value)));
   typed.addEventListener("change", () => {
     const value = Number(typed.value.replace("−", "-").replace(",", "."));
-    if (Number.isFinite(value) && typed.value.trim()) set(value / factor);
+    const asked = Number.isFinite(value) && typed.value.trim();
     typed.blur();
+    if (asked) set(value / factor);
+    else showPendant(live.state);
   });
   const along = (sign) => () => ({ frame: "JOINT", axis: j, sign });
   return make(
@@ -76,7 +84,7 @@ function fillFrames() {
   const names = ["TOOL", "BASE", "WORLD", ...data.animation.frames.map(({ name }) => name)];
   const before = names.includes(frames.value) ? frames.value : "TOOL";
   frames.replaceChildren(
-    ...names.map((name, i) => make("option", { value: name, textContent: i < 3 ? name.toLowerCase() : name })),
+    ...names.map((name, i) => make("option", { value: name, textContent: i < 3 ? `${name.toLowerCase()} axes` : name })),
   );
   frames.value = before;
 }
@@ -89,7 +97,7 @@ function fillPendant() {
   byId("jog").replaceChildren(
     ...[1, -1].flatMap((sign) =>
       names.map((name, axis) =>
-        holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, `${axis < 3 ? "Move" : "Turn"} ${sign > 0 ? "up" : "down"} ${axis < 3 ? "along " : ""}${name}`, () => ({
+        holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, axis < 3 ? `Move along ${sign > 0 ? "+" : "−"}${name}` : `Turn ${sign > 0 ? "+" : "−"} ${name}`, () => ({
           frame: frames.value,
           axis,
           sign,
