@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from importlib.resources import files
 from string import Template
 from typing import Any
@@ -21,6 +22,8 @@ from armwright.spatial.poses import to_noap
 from armwright.studio.workbench import Workbench
 from armwright.version import __version__
 
+# A comment of a style; in scripts they are lines.
+_BLOCK_COMMENT = re.compile(r"^[ ]*/\*.*?\*/$", re.DOTALL | re.MULTILINE)
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = (
     "basics.js",
@@ -62,7 +65,9 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         title=html.escape(f"{workbench.cell.name} - armwright studio"),
         name=html.escape(workbench.cell.name),
         policy=html.escape(policy),
-        style="\n".join([asset("page.css"), asset("film.css"), asset("view.css"), _asset("studio.css")]),
+        style=_without_comments(
+            "\n".join([asset("page.css"), asset("film.css"), asset("view.css"), _asset("studio.css")])
+        ),
         data=json_text({**_shown_first(workbench), "token": token}),
         script=script,
     )
@@ -73,8 +78,8 @@ def _asset(name: str) -> str:
 
 
 def _without_comments(script: str) -> str:
-    """Return a script without lines of comments and blanks before lines, a seventh of it."""
-    lines = map(str.strip, script.splitlines())
+    """Return a script or a style without lines of comments and blanks before lines, a seventh of it."""
+    lines = map(str.strip, _BLOCK_COMMENT.sub("", script).splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 

@@ -31,18 +31,35 @@ function withProblems(pieces) {
   });
 }
 
+// The pieces of each line; a comment of several lines has a piece in each.
+function byLine(pieces, text) {
+  const lines = [[]];
+  for (const { from, to, kind, problem } of pieces) {
+    text
+      .slice(from, to)
+      .split("\n")
+      .forEach((part, i) => {
+        if (i) lines.push([]);
+        if (part) lines.at(-1).push({ part, name: kind || problem ? `${kind} ${problem ? `wavy ${problem.severity}` : ""}` : "" });
+      });
+  }
+  return lines;
+}
+
+// Of a long program only the lines that have changed are painted again.
 function paintText() {
   const text = byId("text").value;
-  const pieces = withProblems(colouredText(text)).filter(({ from, to }) => to > from);
-  byId("colours").replaceChildren(
-    ...pieces.map(({ from, to, kind, problem }) => {
-      const part = text.slice(from, to);
-      return kind || problem ? make("span", { className: `${kind} ${problem ? `wavy ${problem.severity}` : ""}`, textContent: part }) : part;
-    }),
-    "\n",
-  );
-  const lines = text.split("\n").length;
-  if (lines !== editor.lines) fillGutter(lines);
+  const lines = byLine(withProblems(colouredText(text)), text);
+  const rows = byId("colours").children;
+  while (rows.length > lines.length) byId("colours").lastChild.remove();
+  lines.forEach((pieces, i) => {
+    if (i >= rows.length) byId("colours").append(make("div"));
+    const key = JSON.stringify(pieces);
+    if (rows[i].dataset.key === key) return;
+    rows[i].dataset.key = key;
+    rows[i].replaceChildren(...pieces.map(({ part, name }) => (name ? make("span", { className: name, textContent: part }) : part)));
+  });
+  if (lines.length !== editor.lines) fillGutter(lines.length);
 }
 
 function fillGutter(lines) {
@@ -98,6 +115,9 @@ function showEditor(state) {
   }
   followLine(run?.lines[0]?.line);
   const running = new Map((run?.lines ?? []).map((it) => [it.line, it]));
+  const marks = JSON.stringify([program.breakpoints, run?.lines, editor.lines]);
+  if (marks === editor.marks) return;
+  editor.marks = marks;
   [...byId("gutter").children].forEach((button, i) => {
     button.ariaPressed = String(breakpoints.has(i + 1));
     const it = running.get(i + 1);

@@ -114,7 +114,9 @@ function showPendant(state) {
   [...byId("sliders").children].forEach((row, j) => {
     const [slider, typed] = [row.querySelector("input[type=range]"), row.querySelector("input[type=text]")];
     const joint = chosenArm().joints[j];
-    if (!slider.matches(":active")) slider.value = it.q[j];
+    // An older state does not take back what is being moved.
+    const moved = slider.matches(":active") || (document.activeElement === slider && (live.awaiting || live.queue.size));
+    if (!moved) slider.value = it.q[j];
     slider.setAttribute("aria-valuetext", quantityText(QUANTITIES[0], joint, it.q[j]));
     if (document.activeElement !== typed) typed.value = number(it.q[j] * unitFactor(QUANTITIES[0], joint), 2);
     row.classList.toggle("near", near.has(j + 1));
