@@ -242,6 +242,37 @@ def test_forms(tmp_path: Path, fields: dict[str, Any], statement: str, units: st
     np.testing.assert_allclose(arm.base @ forward(arm.arm, end), taught, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "VAR high : FRAME ;\nBEGIN\n  MOVE ARM_1 TO high\nEND.\n",
+        "VAR high : FRAME ;\nBEGIN MOVE ARM_1 TO high END.\n",
+        "VAR high : FRAME ;\nBEGIN MOVE ARM_1 TO high ; END.\n",
+        "VAR high : FRAME ;\nBEGIN\n  MOVE ARM_1 TO high ; { there }\n  { here }\nEND.",
+        "BEGIN END.\n",
+        "BEGIN\nEND.\n",
+        "",
+    ],
+)
+def test_inserted_anywhere(tmp_path: Path, text: str) -> None:
+    """Into whatever program a MOVE is inserted, it stays one, and the MOVE is its last statement."""
+    pages = Pages(tmp_path, program=text)
+    assert pages.send("insert", arm="ARM_1", frame="pick", line=3) == ""
+    program = pages.studio.project.program
+    assert pages.state()["program"]["runs"], program.text
+    assert program.goal_in(program.text[: program.text.index("TO PICK")].count("\n") + 1) == "PICK"
+    assert program.compiled.tree.statements[-1].span.end >= program.text.index("TO PICK")
+
+
+@pytest.mark.parametrize("name", ["BEGIN", "MOVE", "BASE", "1A", "A" * 32, "", "A B"])
+def test_names_that_cannot_be(pages: Pages, name: str) -> None:
+    """Neither the cell nor the program is changed where a name cannot be."""
+    before = pages.studio.project.program.text, pages.file.text
+    assert pages.send("insert", arm="ARM_1", frame=name, line=4) != ""
+    assert pages.send("insert", arm="ARM_1", frame="OK", line=4, approach=5.0) != ""
+    assert (pages.studio.project.program.text, pages.file.text) == before
+
+
 def test_via(pages: Pages) -> None:
     """Frames are put into the VIA of a MOVE, in order; what cannot be combined is refused, and nothing is taught."""
     for number, value in enumerate((0.1, 0.2)):

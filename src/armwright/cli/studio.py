@@ -50,6 +50,8 @@ def studio(
     shown, file = _cell(cell, new)
     if program is None and new is not None and not new.with_suffix(".rlo").exists():
         program = new.with_suffix(".rlo")
+    if program is not None and file is not None and program.resolve() == file.path.resolve():
+        raise usage_error("PROGRAM", f"{program} is the cell file")
     served = Studio(Project(Workbench(shown), file, program))
     try:
         serve(served, lambda address: _announce(address, open_it=open_browser), port)

@@ -21,7 +21,7 @@ from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
 from armwright.files.exchange import exchange_files, overwrite
-from armwright.files.inputs import decode, is_source, read_bytes
+from armwright.files.inputs import decode, is_source, read_bytes, regular_file
 from armwright.files.result_folder import BACKUP, PREFIX, deferred_signals, staging_folder
 
 Content: TypeAlias = str | bytes | Iterable[str]
@@ -127,7 +127,8 @@ def write_back(path: Path, before: str, text: str, bound: str = "table_mb") -> N
         FileFormatError: the file cannot be read any more.
         OutputError: the file cannot be written, or has changed since; the message has the reason.
     """
-    data = read_bytes(path, bound) if path.exists() else b""
+    # A pipe would be waited for, for ever.
+    data = read_bytes(regular_file(path), bound) if path.exists() else b""
     if decode(data, path) != before:
         raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")
     mark = "\ufeff" if data.startswith(BOM_UTF8) else ""

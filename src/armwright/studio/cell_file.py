@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
+import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +16,21 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.reader import parse_cell, read_cell
 from armwright.errors import ArmwrightError, UnknownNameError
-from armwright.extras import import_extra
 from armwright.files.inputs import read_text
 from armwright.files.output import write_back
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.spatial.poses import inverse, to_noap
+from armwright.studio.toml_text import value_spans, with_entry, with_name, without_entry
 
 # Decimals of rotations and of positions [m] of frames, and of joint positions [rad], [m].
 _DECIMALS = np.repeat((9, 7), (9, 3))
 _JOINT_DECIMALS = 7
 # Changes that can be taken back at most.
 _MOST_UNDONE = 200
+# Tables of what is taught, and the parts of the path of an entry in one line.
+_TABLES, _INLINE = ("frames", "joint_targets"), 2
+# What pages call axes, and the longest name of the language.
+_AXES, _LONGEST_NAME = frozenset(("BASE", "TOOL", "JOINT")), 31
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 
 
@@ -77,12 +84,25 @@ class CellFile:
             TeachingError: the name is none, or the cell would be wrong.
         """
         self._check_name(name)
-        document = self._parsed()
-        frames = self._table(document, "frames")
-        key = self._key(frames, name) or name.upper()
+        frames = self._entries("frames")
+        key = _key(frames, name) or name.upper()
         pose = _toml_pose(to_noap(X_WF if X_WP is None else inverse(X_WP) @ X_WF))
-        frames[key] = _value(pose if on == WORLD else f'{{ on = "{on}", at = {pose} }}')
-        self._take(document)
+        entry = frames.get(key)
+        if isinstance(entry, dict) and ("frames", key) not in dict(value_spans(self.text, "frames")):
+            # It is a table of its own: what else stands in it stays.
+            text = with_entry(self.text, ("frames", key), "at", pose)
+            if str(entry.get("on", WORLD)).upper() != on:
+                text = with_entry(text, ("frames", key), "on", json.dumps(on))
+        else:
+            others = {k: v for k, v in entry.items() if k not in {"at", "on"}} if isinstance(entry, dict) else {}
+            if on == WORLD and not others:
+                value = pose
+            else:
+                parent = [] if on == WORLD else [f"on = {json.dumps(on)}"]
+                value = ", ".join([*parent, f"at = {pose}", *(f"{k} = {json.dumps(v)}" for k, v in others.items())])
+                value = f"{{ {value} }}"
+            text = with_entry(self.text, ("frames",), key, value)
+        self._take(text)
 
     def teach_joints(self, name: str, arm: str, q: Array) -> None:
         """Add a joint target, or give it other joint positions.
@@ -96,14 +116,12 @@ class CellFile:
             TeachingError: the name is none, or the cell would be wrong.
         """
         self._check_name(name)
-        document = self._parsed()
-        targets = self._table(document, "joint_targets")
-        key = self._key(targets, name) or name.upper()
+        key = _key(self._entries("joint_targets"), name) or name.upper()
         limits = self.cell.arms[arm].arm.limits
         rounded = np.clip(np.round(q, _JOINT_DECIMALS), limits.lower, limits.upper)
         numbers = ", ".join(repr(float(value) + 0.0) for value in rounded)
-        targets[key] = _value(f'{{ arm = "{arm}", joint_positions = [{numbers}] }}')
-        self._take(document)
+        value = f'{{ arm = "{arm}", joint_positions = [{numbers}] }}'
+        self._take(with_entry(self.text, ("joint_targets",), key, value))
 
     def rename(self, name: str, new: str) -> None:
         """Give a frame or a joint target another name; frames that hang on it follow.
@@ -112,18 +130,16 @@ class CellFile:
             TeachingError: the name is none or taken, or the cell would be wrong.
         """
         self._check_name(new)
-        document = self._parsed()
-        table, key = self._entry(document, name)
-        if new.upper() != key.upper() and any(self._key(each, new) is not None for each in self._tables(document)):
-            raise TeachingError(f"{new.upper()} is taken already")
-        items = [(new.upper() if old == key else old, table[old]) for old in list(table)]
-        for old in list(table):
-            del table[old]
-        for old, value in items:
-            if hasattr(value, "get") and str(value.get("on", "")).upper() == key.upper():
-                value["on"] = new.upper()
-            table[old] = value
-        self._take(document)
+        table, key = self._entry(name)
+        new = new.upper()
+        if new != key.upper() and any(_key(self._entries(each), new) is not None for each in _TABLES):
+            raise TeachingError(f"{new} is taken already")
+        text = with_name(self.text, table, key, new)
+        hangs = re.compile(rf"""(\bon[ \t]*=[ \t]*)?(["']){key}\2""", re.IGNORECASE)
+        for path, (a, b) in reversed(value_spans(text, "frames")):
+            if path[2:] == ("on",) or (len(path) == _INLINE and text[a] == "{"):
+                text = text[:a] + hangs.sub(lambda match: f'{match[1] or ""}"{new}"', text[a:b]) + text[b:]
+        self._take(text)
 
     def forget(self, name: str) -> None:
         """Take a frame or a joint target out.
@@ -131,10 +147,8 @@ class CellFile:
         Raises:
             TeachingError: there is none, or another one hangs on it.
         """
-        document = self._parsed()
-        table, key = self._entry(document, name)
-        del table[key]
-        self._take(document)
+        table, key = self._entry(name)
+        self._take(without_entry(self.text, (table,), key))
 
     def undo(self) -> None:
         """Take back the latest change.
@@ -165,50 +179,43 @@ class CellFile:
 
     # ---- the document --------------------------------------------------------------------------------------------
 
-    def _parsed(self) -> Any:
+    def _entries(self, table: str) -> dict[str, Any]:
+        """Return what stands in a table of the file."""
         if self.path.suffix.lower() == ".json":
             raise TeachingError(f"frames are taught into TOML files, and {self.path.name} is JSON")
-        return import_extra("tomlkit", "teaching", "studio").parse(self.text)
+        entries: dict[str, Any] = tomllib.loads(self.text).get(table, {})
+        return entries
 
-    @staticmethod
-    def _table(document: Any, name: str) -> Any:
-        if name not in document:
-            document[name] = import_extra("tomlkit", "teaching", "studio").table()
-        return document[name]
-
-    @staticmethod
-    def _tables(document: Any) -> list[Any]:
-        """Return the tables with what has been taught."""
-        return [document[name] for name in ("frames", "joint_targets") if name in document]
-
-    @staticmethod
-    def _key(table: Any, name: str) -> str | None:
-        return next((key for key in table if key.upper() == name.upper()), None)
-
-    def _entry(self, document: Any, name: str) -> tuple[Any, str]:
+    def _entry(self, name: str) -> tuple[str, str]:
         """Return the table in which something has been taught, and its key there."""
-        tables = self._tables(document)
-        for table in tables:
-            if (key := self._key(table, name)) is not None:
+        for table in _TABLES:
+            if (key := _key(self._entries(table), name)) is not None:
                 return table, key
-        raise UnknownNameError("frame or joint target", name, [key for table in tables for key in table])
+        raise UnknownNameError(
+            "frame or joint target", name, [key for table in _TABLES for key in self._entries(table)]
+        )
 
     @staticmethod
     def _check_name(name: str) -> None:
         if not _NAME.match(name):
             raise TeachingError(f"a name has letters, digits and _, and begins with a letter, got {name!r}")
-        if name.upper() in VOCABULARIES[Standard.RLO_2].reserved:
-            raise TeachingError(f"{name.upper()} is a word of the language and cannot be a name")
+        if name.upper() in VOCABULARIES[Standard.RLO_2].reserved or name.upper() in _AXES:
+            raise TeachingError(f"{name.upper()} has a meaning of its own and cannot be a name")
+        if len(name) > _LONGEST_NAME:
+            raise TeachingError(f"a name has at most {_LONGEST_NAME} characters, got {len(name)}")
 
-    def _take(self, document: Any) -> None:
-        """Take a changed document, if it is a cell."""
-        text = document.as_string()
+    def _take(self, text: str) -> None:
+        """Take a changed text, if it is that of a cell."""
         try:
             cell = parse_cell(self.path, text)
         except ArmwrightError as error:
             raise TeachingError(str(error)) from error
         self._before = [*self._before, self.text][-_MOST_UNDONE:]
         self.text, self.cell = text, cell
+
+
+def _key(entries: Mapping[str, object], name: str) -> str | None:
+    return next((key for key in entries if key.upper() == name.upper()), None)
 
 
 def _toml_pose(noap: Array) -> str:
@@ -220,8 +227,3 @@ def _toml_pose(noap: Array) -> str:
 def _number_text(value: float, digits: int) -> str:
     rounded = round(float(value), digits) + 0.0
     return str(int(rounded)) if rounded == int(rounded) else f"{rounded:.{digits}f}".rstrip("0")
-
-
-def _value(text: str) -> Any:
-    """Return a value of TOML from its text."""
-    return import_extra("tomlkit", "teaching", "studio").value(text)

@@ -42,6 +42,8 @@ _STEPS, _DAMPING, _LEAST_DAMPING = 40, 0.02, 1e-12
 _POSE = 6
 # A tool that is dragged far at once is led there in at most so many steps.
 _MOST_STRIDES = 16
+# A stride is no shorter than this [m], [rad]: what leaps in one leaps.
+_STRIDE, _TURN = 0.03, math.radians(10.0)
 # Poses are the same within this: of the configuration that was found for one.
 _SAME = 1e-9
 
@@ -181,7 +183,8 @@ class LiveArm:
 
     def turned(self, q: Array) -> Array:
         """Return configurations (..., n) with every angle turned by a revolution into its limits, where possible."""
-        below, above = q < self.lower, q > self.upper
+        # An angle on its limit stays there, whatever rounding says.
+        below, above = q < self.lower - _SAME, q > self.upper + _SAME
         turn = 2 * math.pi * (below.astype(float) - above)
         better = (below | above) & (q + turn >= self.lower) & (q + turn <= self.upper) & self._revolute
         return np.where(better, q + turn, q)
@@ -224,7 +227,9 @@ class LiveArm:
         start, before = self.tool, self.q
         turn = rotation_vector(X_WT[:3, :3] @ start[:3, :3].T)
         try:
-            for share in np.linspace(0.0, 1.0, _MOST_STRIDES + 1)[1:]:
+            far_away = max(np.linalg.norm(X_WT[:3, 3] - start[:3, 3]) / _STRIDE, np.linalg.norm(turn) / _TURN)
+            strides = min(max(1, math.ceil(far_away)), _MOST_STRIDES)
+            for share in np.linspace(0.0, 1.0, strides + 1)[1:]:
                 R = rotation_from_vector(share * turn) @ start[:3, :3]
                 X = homogeneous(R, start[:3, 3] + share * (X_WT[:3, 3] - start[:3, 3]))
                 q = self.configuration_for(X_WT if share == 1.0 else X)

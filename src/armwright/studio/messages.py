@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import typing
 from typing import Any, Literal, TypeAlias
 
@@ -124,12 +123,12 @@ class Teach:
     Attributes:
         arm: name of the arm.
         name: of the frame.
-        on: the frame that it hangs on.
+        on: the frame that it hangs on; as before, or WORLD, when left out.
     """
 
     arm: str
     name: str
-    on: str = "WORLD"
+    on: str = ""
 
 
 @attrs.frozen(kw_only=True)
@@ -512,6 +511,7 @@ def _checked(name: str, value: Any, kind: Any) -> Any:
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MessageError(f"{name}: expected a number, got {shown(value)}")
-    if not math.isfinite(value) or abs(value) > _LARGEST:
+    # Whole numbers may be too large for a float, and nan is no number.
+    if not abs(value) <= _LARGEST:
         raise MessageError(f"{name}: expected a number within {_LARGEST:.0f}, got {shown(value)}")
     return float(value)

@@ -404,4 +404,4 @@ class ProgramRun:
         stop = self._debugger.stop
         if stop is not None and stop.recording is not None:
             return stop.recording()
-        return self._debugger.machine.recording()
+        return self._debugger.view.recording()

@@ -115,11 +115,10 @@ class ProgramText:
         """Take another text.
 
         Raises:
-            ProgramTextError: it is too long.
+            ProgramTextError: it is too long, or no text.
         """
-        if len(text) > _LONGEST:
-            raise ProgramTextError(f"a program has at most {_LONGEST:,} characters, got {len(text):,}")
-        self.text, self.version = text, self.version + 1
+        _check_text(text)
+        self.text, self.version = text.replace("\r\n", "\n"), self.version + 1
         self._compile()
 
     def _compile(self) -> None:
@@ -143,6 +142,7 @@ class ProgramText:
             MissingExtraError: the language server is not installed.
         """
         server = import_extra("armwright.program.language_server.completions", "completion", "studio", "lsprotocol")
+        _check_text(text)
         if not 0 <= offset <= len(text):
             raise ProgramTextError(f"expected a position from 0 to {len(text)}, got {offset}")
         codec = PositionCodec(text, UTF_32)
@@ -210,22 +210,22 @@ class ProgramText:
             raise ProgramTextError("the program has errors of syntax; correct them before a MOVE is inserted")
 
     def insert_move(self, line: int, arm: str, frame: str, form: MoveForm) -> None:
-        """Insert a MOVE behind a line.
+        """Insert a MOVE behind the statement that ends in a line.
 
         Args:
-            line: from 1; 0, and every line that no statement can follow, for behind the last statement.
+            line: from 1; where no statement of the program itself ends, behind the last one.
             arm: name of the arm.
             frame: its goal.
             form: of the MOVE.
 
         Raises:
-            ProgramTextError: the program has errors of syntax, so that its statements are not known.
+            ProgramTextError: the program has errors of syntax, so that its statements are not known, or would have an
+                error with the MOVE; it stays as it is.
         """
         self.require_statements()
         clauses = form.clauses(arm, frame)
-        offset, indent = self._place_behind(line)
-        statement = f"{indent}MOVE {arm} TO {frame}{' ' if clauses else ''}{', '.join(clauses)} ;\n"
-        self._insert((offset, statement), self._declaration(frame))
+        statement = f"MOVE {arm} TO {frame}{' ' if clauses else ''}{', '.join(clauses)} ;"
+        self._insert(*self._behind(line, statement), self._declaration(frame))
 
     def insert_via(self, line: int, frame: str, blend: float) -> None:
         """Let the MOVE in a line go past a frame, behind those that it goes past already.
@@ -238,6 +238,8 @@ class ProgramText:
         Raises:
             ProgramTextError: there is no MOVE in it, or one that goes past no frames.
         """
+        if not 0 <= blend <= _LONGEST_LINE:
+            raise ProgramTextError(f"blend: expected 0 to {_LONGEST_LINE * 1e3:g} mm, got {blend * 1e3:g}")
         move = self.check_via(line)
         past = next((it for it in move.clauses if isinstance(it, Via)), None)
         between = self.text[move.goal.span.end : move.clauses[0].span.start] if move.clauses else ","
@@ -268,10 +270,18 @@ class ProgramText:
         return move
 
     def _insert(self, *pieces: tuple[int, str]) -> None:
-        """Insert texts at offsets; of two at the same place the first stands in front."""
+        """Insert texts at offsets; of two at the same place the first stands in front.
+
+        Raises:
+            ProgramTextError: the program would have an error that it has not; it stays as it is.
+        """
         text = self.text
         for _, (offset, piece) in sorted(enumerate(pieces), key=lambda it: (it[1][0], it[0]), reverse=True):
             text = text[:offset] + piece + text[offset:]
+        before = sum(it.is_error for it in self.compiled.diagnostics)
+        errors = [it for it in self._compiled(text).diagnostics if it.is_error]
+        if len(errors) > before:
+            raise ProgramTextError(f"the program would have an error: {errors[0].code}: {errors[0].message}")
         self.replace(text)
 
     def _declaration(self, frame: str) -> tuple[int, str]:
@@ -286,21 +296,31 @@ class ProgramText:
         begin = next(token for token in self.compiled.tokens if token.key == "BEGIN" and token.start >= behind)
         return begin.start, f"VAR {frame} : FRAME ;\n"
 
-    def _place_behind(self, line: int) -> tuple[int, str]:
-        """Return where a statement can be inserted behind a line, and the blanks in front of it."""
-        program, source = self.compiled.tree, self.compiled.source
-        ends = {source.line(statement.span.end - 1): statement for statement in program.statements}
-        if line in ends:
-            start = source.line(ends[line].span.start)
-        elif program.statements:
-            start = source.line(program.statements[-1].span.start)
-            line = source.line(program.statements[-1].span.end - 1)
-        else:
-            start, line = 0, source.line(program.end.start) - 1
-        starts = [*PositionCodec(self.text).line_starts, len(self.text)]
-        offset = starts[min(line, len(starts) - 1)]
-        first = self.text[starts[start - 1] : starts[start]] if start else "  "
-        return offset, first[: len(first) - len(first.lstrip())]
+    def _behind(self, line: int, statement: str) -> list[tuple[int, str]]:
+        """Return what is to be inserted where, so that a statement stands behind the one that ends in a line."""
+        program, source, tokens = self.compiled.tree, self.compiled.source, self.compiled.tokens
+        if not program.statements:
+            # In front of the END whose point ends the program.
+            end = next(token for token in reversed(tokens) if token.key == "END")
+            lead = "" if self.text[: end.start].endswith("\n") else "\n"
+            return [(end.start, f"{lead}  {statement}\n")]
+        ends = {source.line(it.span.end - 1): it for it in program.statements}
+        before = ends.get(line, program.statements[-1])
+        codec = PositionCodec(self.text)
+        start = codec.line_starts[source.line(before.span.start) - 1]
+        first = self.text[start : before.span.start]
+        indent = first if not first.strip() else "  "
+        following = [token for token in tokens if token.start >= before.span.end]
+        closed = bool(following) and following[0].key == ";"
+        place = following[0].end if closed else before.span.end
+        rest = following[int(closed)] if len(following) > closed else None
+        here = codec.line_of(place)
+        pieces = [] if closed else [(place, " ;")]
+        if rest is not None and codec.line_of(rest.start) == here:
+            # Something else stands in the same line.
+            return [*pieces, (place, f"\n{indent}{statement}\n{indent}")]
+        end = codec.line_end(here)
+        return [*pieces, (end, f"\n{indent}{statement}")]
 
     def goal_in(self, line: int) -> str:
         """Return the frame to which the MOVE in a line goes.
@@ -392,6 +412,13 @@ class ProgramText:
                 for fix in it.fixes
             ],
         }
+
+
+def _check_text(text: str) -> None:
+    if len(text) > _LONGEST:
+        raise ProgramTextError(f"a program has at most {_LONGEST:,} characters, got {len(text):,}")
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise ProgramTextError("half of a character is no text")
 
 
 def moved_lines(lines: Iterable[int], before: str, after: str) -> set[int]:

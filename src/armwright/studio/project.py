@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.errors import UnknownNameError, shown
+from armwright.errors import ArmwrightError, UnknownNameError, shown
 from armwright.files.inputs import read_program
 from armwright.physics.camera_view import CameraView
 from armwright.physics.kinematic_cell import kinematic_cell
@@ -77,15 +77,17 @@ class Project:
         self.workbench.take_frames(file.cell)
         self.program.set_cell(file.cell)
 
-    def teach(self, arm: str, name: str, on: str = WORLD) -> None:
+    def teach(self, arm: str, name: str, on: str = "") -> None:
         """Give a frame the pose of the tool of an arm; it is added where there is none.
 
         Args:
             arm: name of the arm.
             name: of the frame.
-            on: the frame that it hangs on.
+            on: the frame that it hangs on; as before, or WORLD, when left out.
         """
-        self._teach(name, self.workbench.arm(arm).tool, on)
+        known = self._teachable().cell.frames.get(name.upper())
+        parent = WORLD if known is None else known.parent
+        self._teach(name, self.workbench.arm(arm).tool, on or parent)
 
     def _teach(self, name: str, X_WF: Array, on: str) -> None:
         # A program that has run may have moved the frame that is shown; the file has it where it is at the start.
@@ -160,16 +162,23 @@ class Project:
             self.teach(arm, frame)
         elif frame.upper() not in self.workbench.cell.tree():
             raise UnknownNameError("frame", frame, self.workbench.cell.frames)
-        before = self.program.text
-        self.program.insert_move(line, arm, frame.upper(), form)
-        self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
+        self._change_program(lambda: self.program.insert_move(line, arm, frame.upper(), form), taught=teach)
 
     def insert_via(self, arm: str, frame: str, line: int, blend: float) -> None:
         """Teach a frame where the tool is, and let the MOVE in a line go past it; both or neither."""
         self.program.check_via(line)
         self.teach(arm, frame)
+        self._change_program(lambda: self.program.insert_via(line, frame.upper(), blend), taught=True)
+
+    def _change_program(self, change: Callable[[], None], *, taught: bool) -> None:
+        """Change the program after something has been taught for it; if that cannot be, neither is done."""
         before = self.program.text
-        self.program.insert_via(line, frame.upper(), blend)
+        try:
+            change()
+        except ArmwrightError:
+            if taught:
+                self.take_back()
+            raise
         self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
 
     def teach_joints(self, arm: str, name: str) -> None:
@@ -206,7 +215,11 @@ class Project:
 
     def set_breakpoint(self, line: int, *, on: bool) -> None:
         """Set or remove a breakpoint."""
-        if on and len(self.breakpoints) < _MOST_BREAKPOINTS:
+        if on:
+            if not 1 <= line <= self.program.text.count("\n") + 1:
+                raise ProgramTextError(f"there is no line {line}")
+            if len(self.breakpoints) >= _MOST_BREAKPOINTS:
+                raise ProgramTextError(f"there are {_MOST_BREAKPOINTS} breakpoints already")
             self.breakpoints.add(line)
         else:
             self.breakpoints.discard(line)
@@ -294,6 +307,8 @@ class Project:
 
     def keep_motion(self) -> None:
         """Keep the motion of the run, to be compared with another one; of three the first is forgotten."""
+        if self.running().end <= 0:
+            raise ProgramTextError("nothing has moved yet that could be compared")
         self._kept += 1
         self.compared = [*self.compared, kept_motion(self.running().recording(), self._kept)][-2:]
 

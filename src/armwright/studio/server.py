@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import SplitResult, parse_qs, urlsplit
 
 import attrs
 
@@ -92,7 +92,7 @@ class Server:
         if refusal is not None:
             status, text = refusal
             return connection.respond(status, text + "\n")
-        if urlsplit(request.path).path == "/live":
+        if _url(request.path).path == "/live":
             return None
         host = request.headers["Host"]
         policy = _POLICY.format(origin=f"http://{host}", socket=f"ws://{host}")
@@ -113,13 +113,13 @@ class Server:
     def _refusal(self, request: Any) -> tuple[http.HTTPStatus, str] | None:
         """Return why a request is refused; None where it is not."""
         hosts = {f"{HOST}:{self._port}", f"localhost:{self._port}"}
-        url, headers = urlsplit(request.path), request.headers
+        url, headers = _url(request.path), request.headers
         # A page of another name that leads here would be of another origin, and yet read the answer.
         if headers.get_all("Host") not in [[host] for host in hosts]:
             return http.HTTPStatus.MISDIRECTED_REQUEST, "this server answers under its own address only"
         if url.path == "/live":
-            offered = headers.get("Sec-WebSocket-Protocol", "").split(",")
-            if headers.get("Origin") not in {f"http://{host}" for host in hosts}:
+            offered = ",".join(headers.get_all("Sec-WebSocket-Protocol")).split(",")
+            if headers.get_all("Origin") not in [[f"http://{host}"] for host in hosts]:
                 return http.HTTPStatus.FORBIDDEN, "only the page of this server may connect"
             if not any(self._knows(name.strip().removeprefix("armwright.")) for name in offered):
                 return http.HTTPStatus.FORBIDDEN, "the token is not that of this server"
@@ -243,8 +243,10 @@ class Server:
         stopped = stopped or asyncio.Event()
         loop = asyncio.get_running_loop()
         with contextlib.suppress(ValueError, NotImplementedError, RuntimeError):
-            for number in (signal.SIGINT, signal.SIGTERM):
-                loop.add_signal_handler(number, stopped.set)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                # Who ignores one of them, as nohup does, has a reason.
+                if signal.getsignal(number) != signal.SIG_IGN:
+                    loop.add_signal_handler(number, stopped.set)
         serving = websockets.serve(
             self._live,
             HOST,
@@ -253,7 +255,7 @@ class Server:
             select_subprotocol=lambda _, offered: offered[0] if offered else None,
             compression=None,
             max_size=MAX_MESSAGE,
-            open_timeout=5,
+            open_timeout=2,
             ping_interval=2,
             ping_timeout=4,
             close_timeout=0.5,
@@ -276,6 +278,14 @@ class Server:
                 ticking.cancel()
                 for executor in (self._jobs, self._runs):
                     executor.shutdown(wait=False, cancel_futures=True)
+
+
+def _url(path: str) -> SplitResult:
+    """Return the parts of a path; nothing of one that has none."""
+    try:
+        return urlsplit(path)
+    except ValueError:
+        return urlsplit("")
 
 
 def serve(studio: Studio, announce: Callable[[str], None], port: int = 0) -> None:

@@ -24,6 +24,8 @@ _JOG_TIMEOUT = 0.25
 _RATES = (0.05, 8.0)
 # A map is sent again when so many points more are known.
 _MAP_POINTS = 200
+# Messages that wait to be made at most.
+_MOST_JOBS = 8
 # What has to wait until a run has ended.
 _NOT_IN_A_RUN = (
     m.SetJoint,
@@ -98,6 +100,8 @@ class Studio:
             self._refusals.pop(page, None)
         except ArmwrightError as error:
             self._refusals[page] = str(error)
+        except Exception as error:  # noqa: BLE001 - a mistake of ours does not cut off the page that it happens to
+            self._refusals[page] = mistake_text(error)
         return True
 
     def _check(self, command: m.Command, page: int) -> None:
@@ -187,8 +191,12 @@ class Studio:
             case m.Keep():
                 self.workbench.arm(command.arm)
                 run, what, arm = project.running(), command.what, command.arm
+                if len(self.jobs) >= _MOST_JOBS:
+                    raise MessageError("too much is being made already; wait a moment")
                 self.jobs.append((page, lambda: download(run.recording(), what, arm).message()))
             case m.Look():
+                if len(self.jobs) >= _MOST_JOBS:
+                    raise MessageError("too many pictures are being taken already; wait a moment")
                 take, camera = project.camera_picture(command.camera), command.camera
                 self.jobs.append((page, lambda: _picture_message(camera, take())))
             case m.Complete():
@@ -254,9 +262,8 @@ class Studio:
         except DebuggerError as error:
             self.refuse(self.control.page, error)
         except Exception as error:  # noqa: BLE001 - whatever ends a run, what has been taught is not lost with it
-            known = isinstance(error, ArmwrightError)
-            text = str(error) if known else f"the run ended by a mistake of armwright: {type(error).__name__}: {error}"
             self.project.run = None
+            text = str(error) if isinstance(error, ArmwrightError) else mistake_text(error)
             self.refuse(self.control.page, ArmwrightError(text))
         return True
 
@@ -316,6 +323,11 @@ class Studio:
                 lambda: _picture_state(pictures[-1]) if pictures else None,
             ),
         }
+
+
+def mistake_text(error: Exception) -> str:
+    """Return what a page says of an error that is a mistake of armwright."""
+    return f"a mistake of armwright, please report it: {type(error).__name__}: {error}"
 
 
 def _checked_rate(rate: float) -> float:

@@ -296,6 +296,8 @@ def sample_stream(
     for run in segments:
         # A run that was stopped by an obstacle ends between two ticks.
         begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _TICK_TOLERANCE)
+        # One that is under way has been followed as far as time has gone.
+        begin, end = min(begin, ticks), min(end, ticks)
         q[first:begin] = configuration
         local = np.arange(end - begin) * period
         q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))

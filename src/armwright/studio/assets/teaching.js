@@ -132,7 +132,7 @@ function startTeaching() {
   name.addEventListener("input", () => showTeachButton(Object.keys(live.state.around.frames)));
   byId("teach").addEventListener("submit", (event) => {
     event.preventDefault();
-    send({ do: "teach", arm: chosenArm().name, name: name.value, on: byId("teach-on").value });
+    send({ do: "teach", arm: chosenArm().name, name: name.value, on: byId("teach-on").value === "WORLD" ? "" : byId("teach-on").value });
     taught();
   });
   byId("teach-joints").addEventListener("click", () => {
