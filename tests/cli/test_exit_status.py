@@ -134,7 +134,10 @@ def test_output_without_room() -> None:
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_signals(number: signal.Signals) -> None:
     """A signal ends a command with 128 and its number, and one word."""
+    usual = "signal.default_int_handler" if number == signal.SIGINT else "signal.SIG_DFL"
     program = (
+        # Whoever runs the tests may ignore it, as nohup does, and commands respect that.
+        f"import signal; signal.signal({int(number)}, {usual})\n"
         "import os, sys, time, armwright.cli.app as app, armwright.arm.load as load\n"
         f"def struck(): os.kill(os.getpid(), {int(number)}); time.sleep(60)\n"
         "load.arm_names = struck\n"

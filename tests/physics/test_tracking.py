@@ -21,6 +21,8 @@ from samples import Sample
 
 # Largest distances of tools from where they are sent, at SPEED 100 [m].
 FREE, SETTING_DOWN, AT_REST, UNKNOWN = 0.5e-3, 1e-3, 0.1e-3, 1.5e-3
+# Joints that stick as a part is let go whose weight the servo had borne without knowing of it wait for its integral.
+UNKNOWN_AT_REST = 0.2e-3
 # It has come to rest after so long [s].
 STANDING = 0.3
 MOVES = 4
@@ -101,7 +103,7 @@ def test_with_a_part(arm: str, mass: float, sample: Sample, tmp_path: Path) -> N
     moving, resting = np.max(off, axis=0)
     sample.record(f"{mass:g} kg set down by {arm}", len(off), 0, moving=moving, resting=resting)
     assert moving < (SETTING_DOWN if knows else UNKNOWN)
-    assert resting < AT_REST
+    assert resting < (AT_REST if knows else UNKNOWN_AT_REST)
 
 
 def other(arm: Arm, rng: np.random.Generator) -> Arm:
