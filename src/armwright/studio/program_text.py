@@ -301,9 +301,9 @@ class ProgramText:
         program, source, tokens = self.compiled.tree, self.compiled.source, self.compiled.tokens
         if not program.statements:
             # In front of the END whose point ends the program.
-            end = next(token for token in reversed(tokens) if token.key == "END")
-            lead = "" if self.text[: end.start].endswith("\n") else "\n"
-            return [(end.start, f"{lead}  {statement}\n")]
+            last = next(token for token in reversed(tokens) if token.key == "END")
+            lead = "" if self.text[: last.start].endswith("\n") else "\n"
+            return [(last.start, f"{lead}  {statement}\n")]
         ends = {source.line(it.span.end - 1): it for it in program.statements}
         before = ends.get(line, program.statements[-1])
         codec = PositionCodec(self.text)

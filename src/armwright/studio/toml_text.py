@@ -132,13 +132,16 @@ def _checked(before: str, after: str, table: tuple[str, ...], key: str, value: s
         entries = entries.setdefault(part, {})
     if value is None:
         entries.pop(key, None)
+        if not expected[table[0]]:
+            # A table whose entries are tables of their own goes with the last of them.
+            expected |= {table[0]: tomllib.loads(after).get(table[0])}
     else:
         entries[key] = tomllib.loads(f"it = {value}")["it"]
     try:
         found = tomllib.loads(after)
     except tomllib.TOMLDecodeError:
         found = {}
-    if found != expected:
+    if found != {name: entry for name, entry in expected.items() if entry is not None}:
         name = ".".join((*table, key))
         raise TomlLayoutError(f"{name} cannot be changed by itself as the file is laid out; change it by hand")
     return after
