@@ -1,7 +1,9 @@
 """The page of a studio in a browser: moved by hand, by key and by handle, taught, run, and left alone."""
 
+import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -328,6 +330,25 @@ def test_by_keyboard_alone(opened: Opened) -> None:
     opened.until(lambda: opened.state()["run"] is not None)
     page.keyboard.press("Shift+F5")
     opened.until(lambda: opened.state()["run"] is None)
+
+
+def test_view_from_above(opened: Opened) -> None:
+    """The buttons of the view turn the camera, and say nothing else."""
+    page = opened.page
+    tip = [it["points"][1] for it in page.evaluate("studio.gizmo()")]
+    page.get_by_role("button", name="Top", exact=True).click()
+    page.wait_for_timeout(200)
+    assert tip != [it["points"][1] for it in page.evaluate("studio.gizmo()")]
+    assert page.locator("#warnings .error").count() == 0
+
+
+def test_names_of_the_script() -> None:
+    """All scripts of the page are one: a function that has the name of another would take its place."""
+    cell = read_cell(Path(__file__).parents[2] / "examples" / "vision_cell.toml")
+    page = studio_page(Workbench(cell), token="t", policy="p")
+    names = re.findall(r"^(?:async )?function (\w+)", page, re.MULTILINE)
+    assert len(names) > 100
+    assert [name for name, count in Counter(names).items() if count > 1] == []
 
 
 def test_the_page_is_small(tmp_path: Path) -> None:

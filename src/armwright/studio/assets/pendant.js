@@ -16,7 +16,7 @@ function holdButton(text, label, message) {
     button.focus({ preventScroll: true });
     holding.button = button;
     button.classList.add("held");
-    const go = () => send({ do: "jog", arm: chosenArm().name, share: share(), ...message() }, "jog");
+    const go = () => send({ do: "jog", arm: chosenArm().name, share: jogShare(), ...message() }, "jog");
     go();
     holding.timer = setInterval(go, HELD_AGAIN);
   };
@@ -41,7 +41,7 @@ function letGo() {
 }
 
 // Slow speeds have most of the slider.
-function share() {
+function jogShare() {
   return Math.max(0.01, (Number(byId("share").value) / 100) ** 2.5);
 }
 
@@ -152,7 +152,7 @@ function showSolutions(solutions) {
 function startPendant() {
   fillPendant();
   const speed = () => {
-    byId("share-text").textContent = `${number(100 * share(), share() < 0.1 ? 1 : 0)} %`;
+    byId("share-text").textContent = `${number(100 * jogShare(), jogShare() < 0.1 ? 1 : 0)} %`;
   };
   byId("share").addEventListener("input", speed);
   speed();
