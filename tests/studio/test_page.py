@@ -333,12 +333,24 @@ def test_by_keyboard_alone(opened: Opened) -> None:
 
 
 def test_view_from_above(opened: Opened) -> None:
-    """The buttons of the view turn the camera, and say nothing else."""
-    page = opened.page
-    tip = [it["points"][1] for it in page.evaluate("studio.gizmo()")]
+    """The buttons of the view turn the camera and bring the arm into the picture, and say nothing else."""
+    page, points = opened.page, lambda: [it["points"][0] for it in page.evaluate("studio.gizmo()")]
+    first = points()
     page.get_by_role("button", name="Top", exact=True).click()
+    opened.until(lambda: points() != first)
+    number = page.get_by_role("textbox", name="Joint 1 in °")
+    number.fill("150")
+    number.press("Enter")
+    opened.until(lambda: abs(opened.state()["arms"]["ARM_1"]["q"][0] - np.radians(150)) < 1e-6)
+    page.get_by_role("button", name="Front", exact=True).click()
     page.wait_for_timeout(200)
-    assert tip != [it["points"][1] for it in page.evaluate("studio.gizmo()")]
+    box = page.locator("#view").bounding_box()
+    assert all(0 < it["x"] < box["width"] and 0 < it["y"] < box["height"] for it in points())
+    # The handles are drawn with the view, whatever has it drawn: nothing but the tip of an arrow is blue there.
+    tip = next(it["points"][1] for it in page.evaluate("studio.gizmo()") if (it["kind"], it["k"]) == ("move", 2))
+    shade = "([x, y]) => [...document.getElementById('view').getContext('2d').getImageData(x, y, 1, 1).data]"
+    red, _, blue, _ = page.evaluate(shade, [tip["x"] + 5, tip["y"]])
+    assert blue > red + 60
     assert page.locator("#warnings .error").count() == 0
 
 

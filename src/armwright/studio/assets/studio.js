@@ -9,12 +9,6 @@ function drawSoon() {
   requestAnimationFrame(() => {
     drawing = false;
     drawView();
-    if (pen && lens) {
-      paintMap();
-      paintPaths();
-      paintGhost();
-      paintGizmo();
-    }
     STATS.drawn++;
   });
 }
@@ -105,6 +99,7 @@ function onKeyDown(event) {
 function start() {
   startGizmo();
   startView();
+  overpaint.push(paintMap, paintPaths, paintGhost, paintGizmo);
   startOverlays();
   startStrip();
   startPendant();
