@@ -141,6 +141,6 @@ function start() {
   new ResizeObserver(redraw).observe(canvas);
   showLink(null);
   connect();
-  window.studio = { live, stats: STATS, send, gizmo: () => handles().map(({ kind, k, points }) => ({ kind, k, points: points.map(project) })) };
+  window.studio = { live, stats: STATS, send, map: () => overlay.map, gizmo: () => handles().map(({ kind, k, points }) => ({ kind, k, points: points.map(project) })) };
 }
 start();
