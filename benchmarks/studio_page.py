@@ -25,7 +25,7 @@ JOGGING = """(seconds) => new Promise((done) => {
   const arm = Object.keys(studio.live.state.arms)[0];
   const timer = setInterval(() => {
     const t = (performance.now() - begun) / 1000;
-    studio.send({ do: "jog", arm, frame: "JOINT", axis: 0, way: Math.floor(t) % 2 ? 1 : -1, share: 0.5 }, "jog");
+    studio.send({ do: "jog", arm, frame: "JOINT", axis: 0, sign: Math.floor(t) % 2 ? 1 : -1, share: 0.5 }, "jog");
     if (t < seconds) return;
     clearInterval(timer);
     studio.send({ do: "halt" });

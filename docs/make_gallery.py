@@ -204,7 +204,7 @@ EXHIBITS = (
         title="Accuracy according to ISO 9283",
         says="The command computes accuracy and repeatability from measured poses and paths, each characteristic with "
         "its number of cycles. The figure shows the attained poses of one test.",
-        alt="Thirty attained poses beside the commanded pose, in two projections, with the circle of the repeatability",
+        alt="Thirty attained poses beside the commanded pose, in two projections, and their distances from the middle",
         command="iso9283 examples/measured_poses.csv examples/measured_paths.csv",
         shown="01-pose.svg",
     ),

@@ -12,8 +12,8 @@ HEAD = """\
 # Studies
 
 Published numbers of the sources beside those that armwright computes. `armwright study NAME` runs a study and prints \
-more tables than this page; `-o DIR` draws its figures, `--json` prints its tables as data. `make studies` makes this \
-page. Known reasons for differences are in the [errata](errata.md).
+more tables than this page; `-o DIR` writes a page of its figures and tables, `--json` prints its tables \
+as data. `make studies` makes this page. Known reasons for differences are in the [errata](errata.md).
 
 | study | source | takes |
 |---|---|---|

@@ -3,7 +3,8 @@
 It reads calls as lines of JSON and answers each with one: ``{"status": 0, "out": "...", "err": "..."}``. The status is
 negative for the signal that killed a call, and ``null`` for one that did not end in its time. A call has ``arguments``
 of the command line, or ``code``; the ``folder`` in which it is made, and a ``scratch`` folder for its output; it may
-have an ``environment``, which replaces that of the server, and a ``file_size`` that no file may exceed [bytes].
+have an ``environment``, which replaces that of the server, a ``file_size`` that no file may exceed [bytes], and be
+``terminated`` after a time [s], as whoever stops a server does.
 
 What most calls need is named in the arguments, and loaded once for all of them.
 """
@@ -73,6 +74,9 @@ def _be_the_command(call: dict[str, Any], out: Path, err: Path) -> None:
     sys.__stderr__ = sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", closefd=False)  # noqa: SIM115
     resource.setrlimit(resource.RLIMIT_CPU, (_PROCESSOR, _PROCESSOR))
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    if (seconds := call.get("terminated")) is not None:
+        signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
+        signal.setitimer(signal.ITIMER_REAL, seconds)
     if (size := call.get("file_size")) is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
     if (environment := call.get("environment")) is not None:

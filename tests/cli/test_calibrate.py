@@ -1,6 +1,7 @@
 """``armwright calibrate`` and ``armwright plan-poses`` as a user calls them."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.calibration.chain import kinematic_chain
 from armwright.kinematics.forward_kinematics import forward
+from armwright.report.elements import length_text
 from cli_calls import armwright
 
 ARM = "puma560"
@@ -66,9 +68,46 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     assert off.mean() < 0.2
     assert said.mean() > 1.0
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == 2
+    assert page.count("<figure>") == 2
     assert "http://" not in page
     assert "https://" not in page
+    told = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
+    before, after = (told["distances"][name]["mean"] for name in ("nominal, base best-fitted", "calibrated, held out"))
+    tiles = re.findall(r'<li class="figure"><b>([^<]*)</b>', page)
+    assert tiles[:2] == [length_text(before), f"→ {length_text(after)}"]
+    assert before > 20 * after
+    # A plain fact is no warning, and what lies beside the page is linked.
+    assert '<li class="warning">' not in page
+    assert f"<li>{len(told['errors'])} errors fitted to 40 readings" in page
+    assert set(re.findall(r'<a href="([^"]*)" download>', page)) == files - {"report.html", "run.json"}
+    # Errors that may be none are faded, and only those.
+    faded = re.findall(r'<tr class="faded"><td>([^<]*)', page)
+    errors = told["errors"].items()
+    assert faded
+    assert set(faded) == {name for name, error in errors if abs(error["value"]) < 2 * error["standard_error"]}
+
+
+def test_a_reading_that_is_off(measured: Path, tmp_path: Path) -> None:
+    """A reading whose residual stands out is named, in the terminal, in the data and as a warning on the page."""
+    head, *rows = measured.read_text(encoding="utf-8").splitlines()
+    *cells, z = rows[16].split(",")
+    rows[16] = ",".join([*cells, f"{float(z) + 0.3:.5f}"])
+    path = tmp_path / "off.csv"
+    path.write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+
+    done = armwright("calibrate", ARM, path, "-o", tmp_path / "out", columns=300)
+
+    assert done.returncode == 0, done.stderr
+    told = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
+    assert (told["outliers"], told["remarkable"]) == ([], [16])
+    (note,) = (note for note in told["notes"] if "noise explains" in note)
+    assert ": 18 (0." in note
+    assert note in done.stdout
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r'<li class="warning"><b>Note</b>([^<]*)', page) == [note]
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page)[1])
+    assert data["marked"] == [16]
+    assert data["said"][16].startswith("18: 0.")
 
 
 def test_json(measured: Path) -> None:

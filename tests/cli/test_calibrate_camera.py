@@ -1,6 +1,7 @@
 """``armwright calibrate-camera`` as a user calls it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +70,12 @@ def test_pictures_of_a_camera_beside_the_arm(scene: Scene, folder: Path, tmp_pat
     lens_errors = [value["standard_error"] for value in data["lens"].values()]
     assert np.all(np.abs(lens.numbers - scene.lens.numbers) < 5 * np.array(lens_errors))
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == 3
+    assert page.count("<figure>") == 3
+    assert f"<b>{data['sigma_px']:.3g} px</b>" in page
+    assert set(re.findall(r'<a href="([^"]*)" download>', page)) == {path.name for path in out.iterdir()} - {
+        "report.html",
+        "run.json",
+    }
     assert "http://" not in page
 
     # The corners that were written give the same, as does the lens that was written, with the corners alone.

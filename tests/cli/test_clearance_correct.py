@@ -1,12 +1,14 @@
 """``armwright clearance correct`` as a user calls it."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from armwright.report.elements import length_text
 from cli_calls import armwright, check_mistake
 from five_bar_example import CENTRE, PLAY
 
@@ -46,12 +48,22 @@ def test_correct(tmp_path: Path) -> None:
     assert len(found["mean_errors"]) == 2
     assert (found["runs"], found["sampling"]) == (16, "indistinguishable clearances")
     assert max(found["after_spread"][:2]) < 1e-8
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "path.csv",
+        "summary.json",
+        "paths.svg",
+        "report.html",
+        "run.json",
+    }
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == found
     table = np.genfromtxt(tmp_path / "out" / "path.csv", delimiter=",", names=True)
     np.testing.assert_allclose([table["x_mm"][0], table["y_mm"][0]], np.array(found["nodes"][0]) * 1e3, rtol=1e-8)
     assert (table["vx_mm_per_s"][[0, -1]] == 0).all()
     assert ET.parse(tmp_path / "out" / "paths.svg").getroot().tag.endswith("svg")
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    before, after = (length_text(np.mean(found[name])) for name in ("before", "after"))
+    assert re.findall(r'<li class="figure"><b>([^<]*)</b>', page)[:2] == [before, f"→ {after}"]
+    assert set(re.findall(r'<a href="([^"]*)" download>', page)) == {"path.csv", "summary.json", "paths.svg"}
 
 
 def test_correct_a_whole_path(estimate: Path, tmp_path: Path) -> None:
@@ -71,7 +83,13 @@ def test_correct_a_whole_path(estimate: Path, tmp_path: Path) -> None:
     told = json.loads((folder / "summary.json").read_text())
     means = {name: one["mean"] for name, one in ESTIMATE["parameters"].items()}  # type: ignore[attr-defined]
     assert told["clearances"] == pytest.approx(means, abs=DRAWN)
-    assert {file.name for file in folder.iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
+    assert {file.name for file in folder.iterdir()} == {
+        "path.csv",
+        "summary.json",
+        "paths.svg",
+        "report.html",
+        "run.json",
+    }
 
 
 def test_no_path_for_a_contradiction(estimate: Path) -> None:

@@ -29,6 +29,8 @@ Q = "10,-60,80,40,50,60"
 LOADED = ("armwright.cli.app", "armwright.arm.load", "armwright.program.api", "armwright.cell.reader",
           "armwright.program.vm.interpreter", "armwright.report.run_files", "armwright.motion.moves",
           "armwright.clearance.reader", "armwright.compiled.arm", "rich.markdown")  # fmt: skip
+# A server ends when it is told to [s].
+_SERVED = 6.0
 # By the words that call it: arguments with which a command does something small.
 CALLS: dict[str, list[str]] = {
     "": ["arms", "--json"],
@@ -36,6 +38,7 @@ CALLS: dict[str, list[str]] = {
     "check": ["p.rlo", "--cell", "cell.toml", "--json"],
     "explain": ["E206", "--json"],
     "repl": ["p.rlo", "--cell", "cell.toml", "--json"],
+    "studio": ["cell.toml", "p.rlo"],
     "debug": ["p.rlo", "--cell", "cell.toml"],
     "fmt": ["p.rlo", "--json"],
     "fix": ["p.rlo", "--json"],
@@ -159,7 +162,8 @@ def call(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Call]:
     base = tmp_path_factory.mktemp("walk")
     # Whose home is another folder finds what is compiled all the same.
     cache = {"ARMWRIGHT_CACHE": str(cache_folder() or base / "cache")}
-    settings = {**cache, "COLUMNS": "120", "NO_COLOR": "1", "OPENBLAS_NUM_THREADS": "1"}
+    # What a command opens in a browser is opened by a program that does nothing.
+    settings = {**cache, "BROWSER": "true", "COLUMNS": "120", "NO_COLOR": "1", "OPENBLAS_NUM_THREADS": "1"}
     folder = base / "around" / "here"
     with fork_server(LOADED, {**os.environ, **settings}) as server:
 
@@ -169,7 +173,8 @@ def call(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Call]:
             folder.mkdir(parents=True)
             _fill(folder)
             with other_end(folder / "pipe", read=case.parameter == "output") if case.has_pipe else nullcontext():
-                answer = server.call(folder, base, arguments=case.arguments)
+                ends = {"terminated": _SERVED} if case.command == "studio" else {}
+                answer = server.call(folder, base, arguments=case.arguments, **ends)
             answer["left"] = [path.name for path in folder.parent.rglob(".armwright-*")]
             return answer
 

@@ -1,6 +1,7 @@
 """``armwright iso9283`` as a user calls it."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +36,49 @@ def test_report(tmp_path: Path) -> None:
     assert "holds" in rows["AT"]
     assert "planar reduction: settling P1, path line, cornering square measured in a plane" in done.stdout
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == sum(name.endswith(".svg") for name in written)
+    assert page.count("<figure>") == sum(name.endswith(".svg") for name in written)
     assert "http" not in page.replace("http-equiv", "")
-    assert "limit exceeded" in page
+    # Once, beside the heading; the largest RP is above all.
+    assert page.count("limit exceeded") == 1
+    measures = json.loads((tmp_path / "out" / "measures.json").read_text(encoding="utf-8"))["measures"]
+    largest = max(one["value"] for one in measures if one["symbol"] == "RP")
+    assert f'<li class="figure bad"><b>{largest * 1e3:.4f} mm</b><small>RP, pose repeatability, of P2' in page
+    assert "<td>AP<sub>x</sub></td>" in page
+    # Readings are in thousandths; every length has one digit more.
+    lengths = re.findall(r'<td class="number">(?:± )?-?([0-9.]+)</td><td>mm</td>', page)
+    assert len(lengths) > 20
+    assert all(len(text.partition(".")[2]) == 4 for text in lengths)
+
+
+def test_conditions_of_the_tests(tmp_path: Path) -> None:
+    """What is said of the tests is in the report and the data; what is not said is a line to fill in."""
+    about = ("--about", "robot=PUMA 560, no. <7>", "--about", "date = 2026-07-01")
+    done = armwright("iso9283", POSES, "-o", tmp_path / "out", *about)
+
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<dt>Robot, serial number</dt><dd>PUMA 560, no. &lt;7&gt;</dd>" in page
+    assert "<dt>Date of the measurement</dt><dd>2026-07-01</dd>" in page
+    blank = re.findall(r'<dt>([^<]*)</dt><dd class="blank"></dd>', page)
+    assert blank == ["Load", "Speed", "Ambient temperature", "Measuring instrument", "Operator"]
+    told = json.loads((tmp_path / "out" / "measures.json").read_text(encoding="utf-8"))
+    assert told["about"] == {"robot": "PUMA 560, no. <7>", "date": "2026-07-01"}
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["colour=red"], "expected one of robot, load"),
+        (["robot"], "expected one of robot, load"),
+        (["robot="], "expected one of robot, load"),
+        (["robot=a", "robot=b"], "robot is said twice"),
+    ],
+)
+def test_conditions_that_are_none(texts: list[str], said: str) -> None:
+    done = armwright("iso9283", POSES, *(word for text in texts for word in ("--about", text)), columns=200)
+
+    assert done.returncode == 2
+    assert said in done.stderr
 
 
 @pytest.mark.parametrize("how", ["-q", "--json"])

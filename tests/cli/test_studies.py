@@ -1,6 +1,7 @@
 """The commands study, singularity and simulate."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -23,11 +24,19 @@ def test_study_writes_its_figures(tmp_path: Path) -> None:
     assert first.returncode == 0
     assert "6.47" in first.stdout
     names = {f"figure{number:02d}.svg" for number in range(3, 12)}
-    assert {path.name for path in (tmp_path / "a").iterdir()} == names | {"tables.json", "run.json"}
+    assert {path.name for path in (tmp_path / "a").iterdir()} == names | {"tables.json", "report.html", "run.json"}
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
         assert ET.parse(tmp_path / "a" / name).getroot().tag.endswith("svg")
     tables = json.loads(again.stdout)
+    page = (tmp_path / "a" / "report.html").read_text(encoding="utf-8")
+    captions = re.findall(r"<figcaption>Figure (\d+): [^<]+</figcaption>", page)
+    assert captions == [str(number) for number in range(3, 12)]
+    assert set(re.findall(r'<a href="([^"]*)" download>', page)) == names | {"tables.json"}
+    printed = [row["verdict"] for row in tables["constants"] + tables["load"]]
+    tiles = re.findall(r'<li class="figure[^"]*"><b>([^<]*)</b>', page)
+    assert tiles[:2] == [f"{printed.count('agrees')} of {len(printed)}", str(printed.count("wrong"))]
+    assert "http" not in page.replace("http-equiv", "")
     assert {row["name"] for row in tables["constants"] if row["verdict"] == "wrong"} == {"b4", "k2", "b20", "k3 / b5"}
 
 

@@ -2,12 +2,15 @@
 
 import html
 from pathlib import Path
+from typing import Any
 
+import attrs
 import numpy as np
 import pytest
 
 from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import read_measurements
+from armwright.report import accuracy_figures
 from armwright.report.accuracy_figures import accuracy_drawings
 from armwright.report.accuracy_files import accuracy_files
 
@@ -95,3 +98,46 @@ def test_units_for_people(everything: Assessment) -> None:
     assert by_symbol["RD"].verdict == "exceeds"
     assert by_symbol["RP"].displayed_cycles == "10 of 30"
     assert by_symbol["t"].displayed_cycles == "3"
+
+
+def test_poses_are_drawn_on_one_scale(everything: Assessment, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cloud of one pose and one ten times as wide are drawn with axes of one width, equal along x, y and z."""
+    pose = everything.tests[0]
+    cloud = pose.clouds[0]
+    wide = attrs.evolve(cloud, positions=cloud.commanded + 10 * (cloud.positions - cloud.commanded))
+    both = assess([pose, attrs.evolve(pose, name="wide", clouds=(wide,))], few=True)
+    drawn = []
+    monkeypatch.setattr(accuracy_figures, "svg_text", lambda figure, _: drawn.append(figure) or "")
+
+    accuracy_drawings(both)
+
+    planes = [axis for figure in drawn for axis in figure.axes[:2]]
+    assert len(planes) == 4
+    limits = [limit for axis in planes for limit in (axis.get_xlim(), axis.get_ylim())]
+    np.testing.assert_allclose(np.ptp(limits, axis=1), np.ptp(limits[0]))
+    assert all(axis.get_aspect() == 1 for axis in planes)
+    for axis in planes:
+        for line in axis.lines:
+            assert np.all((line.get_xdata() > axis.get_xlim()[0]) & (line.get_xdata() < axis.get_xlim()[1]))
+    # Below, each cycle has its distance, and the bars count all of them.
+    trend, histogram = drawn[0].axes[2:]
+    assert len(trend.lines[0].get_ydata()) == len(cloud.positions)
+    assert sum(bar.get_width() for bar in histogram.patches) == len(cloud.positions)
+
+
+@pytest.mark.browser
+def test_page_on_a_phone(browser: Any, everything: Assessment, tmp_path: Path) -> None:
+    """On a phone nothing is wider than the screen, and the values of all measures are seen without scrolling."""
+    file = tmp_path / "report.html"
+    files = accuracy_files(everything.with_limits({"AP": 1e-3}), title="A", command="a")
+    file.write_text(files["report.html"], encoding="utf-8")
+    page = browser.new_page(viewport={"width": 390, "height": 800})
+    page.goto(file.as_uri())
+
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    rights = page.evaluate(
+        "[...document.querySelectorAll('td:nth-child(3)')].map(td => td.getBoundingClientRect().right)"
+    )
+    assert len(rights) == len(everything.measures)
+    assert max(rights) <= 390
+    page.close()

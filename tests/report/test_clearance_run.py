@@ -427,3 +427,21 @@ def test_diverged_page(browser: Any, tmp_path: Path, simulation: Simulation) -> 
     assert shown.page.locator("#status").inner_text() == "diverged"
     assert [text for text in shown.said if not text.startswith("data:image/svg+xml")] == []
     shown.page.close()
+
+
+@pytest.mark.browser
+def test_page_on_a_phone(opened: Opened, run: ClearanceRun) -> None:
+    """On a phone nothing is wider than the screen, and all bearings are seen at once; wide, they share one column."""
+    shown = opened.page
+    shown.set_viewport_size({"width": 390, "height": 800})
+    assert shown.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert shown.locator("#bearings").bounding_box()["height"] < 450
+
+    shown.set_viewport_size({"width": 1280, "height": 900})
+    boxes = [shown.locator(".bearing").nth(i).bounding_box() for i in range(3)]
+    assert len({(box["x"], box["width"]) for box in boxes}) == 1
+    data = run.as_data()
+    tiles = shown.locator(".headline b").all_inner_texts()
+    assert tiles[0] == f"{data['error']['largest'] * 1e3:.4g} mm"
+    assert f"{max(pin['peak_force'] for pin in data['pins'].values()):.4g} N" in tiles
+    assert "explained" not in shown.content()

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import JointLimits
-from armwright.report.headline import Figure, headline, headline_list
+from armwright.report.elements import Tile, headline
+from armwright.report.headline import run_headline
 from armwright.report.limit_spans import LimitSpan, limit_spans
 from armwright.report.page import LeastDistance, RunPage
 
 
-def figures(data: RunPage) -> dict[str, Figure]:
-    return {figure.label.split(",")[0]: figure for figure in headline(data)}
+def figures(data: RunPage) -> dict[str, Tile]:
+    return {figure.label.split(",")[0]: figure for figure in run_headline(data)}
 
 
 def limits(**changes: float) -> JointLimits:
@@ -33,10 +34,10 @@ def test_numbers_of_a_run(bench: RunPage) -> None:
     assert shown["peak effort"].value == f"{100 * share:.0f} %"
     assert shown["peak effort"].label == f"peak effort, {arm} {joint}"
     assert shown["largest path deviation"].value == "0.34 mm"
-    assert shown["limits reached"] == Figure("none", "limits reached")
+    assert shown["limits reached"] == Tile("none", "limits reached")
     assert "least distance" not in shown
     failed = figures(attrs.evolve(bench, status="failed: E406 at 8.9 s"))
-    assert failed["until the failure"] == Figure("9.00 s", "until the failure", "failed: E406 at 8.9 s")
+    assert failed["until the failure"] == Tile("9.00 s", "until the failure", "failed: E406 at 8.9 s")
 
 
 def test_the_least_distance(bench: RunPage) -> None:
@@ -47,7 +48,7 @@ def test_the_least_distance(bench: RunPage) -> None:
     stages = [attrs.evolve(one, clearance=it) for one, it in zip(bench.stages, clearances, strict=True)]
     run = attrs.evolve(bench, stages=stages, clearance=0.005)
 
-    assert figures(run)["least distance"] == Figure("4.0 mm", "least distance", "A – B, at 1.50 s", "warn")
+    assert figures(run)["least distance"] == Tile("4.0 mm", "least distance", "A – B, at 1.50 s", "warn")
     assert figures(attrs.evolve(run, clearance=0.001))["least distance"].mark == ""
     only_far = attrs.evolve(run, stages=[attrs.evolve(one, clearance=far) for one in bench.stages])
     assert figures(only_far)["least distance"].value == "> 50 mm"
@@ -67,7 +68,7 @@ def test_limits_reached_and_exceeded(bench: RunPage) -> None:
 
 def test_figures_are_text() -> None:
     """Whatever stands in a number or its name is no element of the page."""
-    text = headline_list([Figure("<b>", '"x"', "<i>", "bad")])
+    text = headline([Tile("<b>", '"x"', "<i>", "bad")])
     assert text.count("<b>") == 1
     assert "&lt;b&gt;" in text
     assert 'title="&lt;i&gt;"' in text

@@ -1,5 +1,6 @@
 """Drawings that do not depend on the machine that draws them."""
 
+import re
 import runpy
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -7,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.report.figures import curves
-from armwright.report.svg import alike, normalize_svg
+from armwright.report.elements import Card
+from armwright.report.figures import Drawing, curves
+from armwright.report.static_page import static_page
+from armwright.report.svg import alike, inline_svg, normalize_svg
 
 DOCS = Path(__file__).parents[2] / "docs"
 DRAWINGS = sorted([*(DOCS / "gallery").glob("*.svg"), *(DOCS / "pictures").glob("*.svg")])
@@ -57,3 +60,56 @@ def test_the_gallery_keeps_a_picture(tmp_path: Path) -> None:
     new.write_text(drawn(0.01))
     copied(new, picture)
     assert picture.read_text() == drawn(0.01)
+
+
+def test_drawings_of_a_page_have_its_colours() -> None:
+    """Ink is the text colour, the ground that of the card, series have variables; the file itself stays as it is."""
+    file = drawn()
+    inline = inline_svg(file, "one")
+
+    assert "#ffffff" in file
+    assert "#1f77b4" in file
+    assert set(re.findall(r"(?:fill|stroke): ([^;\"]+)", inline)) == {
+        "none",
+        "currentColor",
+        "var(--card)",
+        "var(--c0)",
+        "var(--c1)",
+        *(f"color-mix(in srgb, currentColor {ink}%, var(--card))" for ink in (20, 31)),
+    }
+    # Without a name space, a style for all of the page, and the texts of the figure.
+    assert not re.search(r"xmlns|xlink|<style|<!--|<\?xml", inline)
+
+
+def test_drawings_of_a_page_share_no_identifiers() -> None:
+    """Every part that a drawing of a page names is its own."""
+    texts = [inline_svg(drawn(), name) for name in ("one", "two")]
+    own = [set(re.findall(r'id="([^"]*)"', text)) for text in texts]
+
+    assert not own[0] & own[1]
+    for text, parts in zip(texts, own, strict=True):
+        named = set(re.findall(r'href="#([^"]*)"|url\(#([^)]*)\)', text))
+        assert {a or b for a, b in named} == parts
+
+
+def test_a_caption_is_a_text() -> None:
+    element = Drawing("one", '"><script>', drawn()).element
+
+    assert "<script>" not in element
+    assert element.count("&quot;&gt;&lt;script&gt;") == 2
+
+
+@pytest.mark.browser
+def test_nothing_white_in_the_dark(browser) -> None:
+    """On a dark page no shape of a drawing is white, and its letters are light."""
+    page = browser.new_page(color_scheme="dark")
+    page.set_content(
+        static_page(title="A", command="a", sections=[Card("Figures", Drawing("one", "A", drawn()).element)])
+    )
+    fills = page.evaluate("[...document.querySelectorAll('figure svg *')].map(e => getComputedStyle(e).fill)")
+    letters = page.evaluate("getComputedStyle(document.querySelector('figure svg use[href*=DejaVu]')).fill")
+    page.close()
+
+    assert "rgb(255, 255, 255)" not in fills
+    assert "rgb(26, 32, 41)" in fills
+    assert letters == "rgb(228, 233, 239)"

@@ -1,6 +1,7 @@
 """The summary of trials: shares with their intervals, errors, causes, and its files."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -91,3 +92,10 @@ def test_files_of_trials() -> None:
     assert json.loads(files["trials.json"]) == json.loads(json.dumps(summary.as_data()))
     assert "7 of 10 trials succeed" in files["report.html"]
     assert "placing errors" in files["errors.svg"]
+    data = summary.as_data()
+    assert re.findall(r"<b>([^<]*)</b>", files["report.html"]) == [
+        f"{data['success']:.1%}",
+        "39.7% to 89.2%",
+        f"{data['errors_mm']['median']:.3g} mm",
+        f"{data['errors_mm']['p95']:.3g} mm",
+    ]

@@ -23,8 +23,8 @@ def test_commands() -> None:
     assert read_message('{"do": "joint", "arm": "ARM_1", "joint": 2, "value": 0.5}') == SetJoint(
         arm="ARM_1", joint=2, value=0.5
     )
-    jog = '{"do": "jog", "arm": "ARM_1", "frame": "TOOL", "axis": 3, "way": -1, "share": 1}'
-    assert read_message(jog) == Jog(arm="ARM_1", frame="TOOL", axis=3, way=-1, share=1.0)
+    jog = '{"do": "jog", "arm": "ARM_1", "frame": "TOOL", "axis": 3, "sign": -1, "share": 1}'
+    assert read_message(jog) == Jog(arm="ARM_1", frame="TOOL", axis=3, sign=-1, share=1.0)
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_commands() -> None:
         ('{"do": "undo", "much": 1}', "no field 'much'"),
         ('{"do": "tool", "arm": "ARM_1", "pose": [1, "2"]}', "expected a number"),
         ('{"do": "grip", "arm": "' + "A" * 500 + '", "open": true}', "longer than 200"),
-        ('{"do": "jog", "arm": "A", "frame": "TOOL", "axis": 1, "way": 0, "share": 1}', "expected 1 or -1"),
+        ('{"do": "jog", "arm": "A", "frame": "TOOL", "axis": 1, "sign": 0, "share": 1}', "expected 1 or -1"),
     ],
 )
 def test_refused(text: str, told: str) -> None:

@@ -190,7 +190,7 @@ def test_a_lost_page_stops_its_jog(running: Running, end: str) -> None:
     arm = running.studio.workbench.arms["ARM_1"]
     with contextlib.suppress(OSError), running.connect() as page:
         page.recv(5)
-        page.send('{"do": "jog", "arm": "ARM_1", "frame": "JOINT", "axis": 0, "way": 1, "share": 0.5}')
+        page.send('{"do": "jog", "arm": "ARM_1", "frame": "JOINT", "axis": 0, "sign": 1, "share": 0.5}')
         page.recv(5)
         time.sleep(0.1)
         if end == "cut":

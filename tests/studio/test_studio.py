@@ -12,6 +12,7 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.files.inputs import read_program
 from armwright.kinematics.forward_kinematics import forward
+from armwright.physics.world import PhysicsCell
 from armwright.program.api import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.studio.cell_file import CellFile
@@ -81,17 +82,17 @@ def pages(tmp_path: Path) -> Pages:
 # ---- jogging ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("frame", "axis", "way"), [("WORLD", 2, 1), ("TOOL", 0, -1), ("BASE", 1, 1), ("LOW", 4, -1)])
-def test_jog(pages: Pages, frame: str, axis: int, way: int) -> None:
+@pytest.mark.parametrize(("frame", "axis", "sign"), [("WORLD", 2, 1), ("TOOL", 0, -1), ("BASE", 1, 1), ("LOW", 4, -1)])
+def test_jog(pages: Pages, frame: str, axis: int, sign: int) -> None:
     """A jog moves along one axis of its frame, at its speed, as long as it is kept going."""
     before = pages.tool
     for _ in range(5):
-        assert pages.send("jog", arm="ARM_1", frame=frame, axis=axis, way=way, share=0.2) == ""
+        assert pages.send("jog", arm="ARM_1", frame=frame, axis=axis, sign=sign, share=0.2) == ""
         pages.wait(0.1)
     after = pages.tool
     axes = {"WORLD": np.eye(3), "BASE": np.eye(3), "TOOL": before[:3, :3], "LOW": before[:3, :3]}[frame]
     if axis < 3:
-        np.testing.assert_allclose(after[:3, 3] - before[:3, 3], way * 0.25 * 0.2 * 0.5 * axes[:, axis], atol=1e-6)
+        np.testing.assert_allclose(after[:3, 3] - before[:3, 3], sign * 0.25 * 0.2 * 0.5 * axes[:, axis], atol=1e-6)
         np.testing.assert_allclose(after[:3, :3], before[:3, :3], atol=1e-6)
     else:
         turned = after[:3, :3] @ before[:3, :3].T
@@ -103,7 +104,7 @@ def test_jog(pages: Pages, frame: str, axis: int, way: int) -> None:
 @pytest.mark.parametrize("end", ["halt", "silence", "page closed", "handed over"])
 def test_a_jog_stops(pages: Pages, end: str) -> None:
     """A jog stops when its key is let go, when the page says nothing more, is lost, or has handed over control."""
-    pages.send("jog", arm="ARM_1", frame="JOINT", axis=0, way=1, share=1.0)
+    pages.send("jog", arm="ARM_1", frame="JOINT", axis=0, sign=1, share=1.0)
     pages.wait(0.1)
     if end == "halt":
         pages.send("halt")
@@ -123,7 +124,7 @@ def test_a_jog_stops(pages: Pages, end: str) -> None:
 def test_a_jog_to_a_limit(pages: Pages) -> None:
     """A joint that comes to its limit stays there, and that is said."""
     for _ in range(100):
-        pages.send("jog", arm="ARM_1", frame="JOINT", axis=5, way=1, share=1.0)
+        pages.send("jog", arm="ARM_1", frame="JOINT", axis=5, sign=1, share=1.0)
         pages.wait(0.1)
     assert pages.state()["refusal"] == "joint 6 is at its limit"
     arm = pages.studio.workbench.arms["ARM_1"]
@@ -149,12 +150,12 @@ def test_wrong_commands(pages: Pages) -> None:
     before = pages.state()["arms"]
     assert "ARM_1" in pages.send("joint", arm="ARM_2", joint=1, value=0.0)
     assert "joints 1 to 6" in pages.send("joint", arm="ARM_1", joint=7, value=0.0)
-    assert "6 joints" in pages.send("joints", arm="ARM_1", q=[0.0])
+    assert "joints 1 to 6" in pages.send("joint", arm="ARM_1", joint=7, value=0.0)
     assert pages.send("tool", arm="ARM_1", pose=[1.0] * 12) != ""
     assert pages.send("tool", arm="ARM_1", pose=[1.0] * 3) != ""
     assert "did you mean jog" in pages.send("jogg")
     assert "HIGH" in pages.send("go to", arm="ARM_1", name="HIHG")
-    assert "share" in pages.send("jog", arm="ARM_1", frame="TOOL", axis=0, way=1, share=0.0)
+    assert "share" in pages.send("jog", arm="ARM_1", frame="TOOL", axis=0, sign=1, share=0.0)
     assert pages.state()["arms"] == before
 
 
@@ -322,10 +323,10 @@ def test_breakpoints_steps_and_back(pages: Pages) -> None:
     run = pages.state()["run"]
     assert (run["reason"], run["lines"][0]["line"], run["playing"]) == ("breakpoint", 5, False)
     there = pages.studio.workbench.arms["ARM_1"].q.copy()
-    pages.send("go", way="next")
+    pages.send("go", step="next")
     pages.wait(6.0)
     assert not np.array_equal(pages.studio.workbench.arms["ARM_1"].q, there)
-    pages.send("go", way="back")
+    pages.send("go", step="back")
     pages.wait(1.0)
     np.testing.assert_array_equal(pages.studio.workbench.arms["ARM_1"].q, there)
 
@@ -361,12 +362,16 @@ def test_compared_motions(pages: Pages) -> None:
         arm, recording_end = motion["arms"]["ARM_1"], motion["duration"]
         path = np.array(arm["path"])
         assert arm["t"][-1] == pytest.approx(recording_end, abs=2e-3)
-        assert arm["figures"]["way"] == pytest.approx(np.linalg.norm(np.diff(path, axis=0), axis=1).sum(), rel=1e-2)
+        assert arm["figures"]["path_length"] == pytest.approx(
+            np.linalg.norm(np.diff(path, axis=0), axis=1).sum(), rel=1e-2
+        )
         most = pages.file.cell.arms["ARM_1"].arm.limits.speed
         share = np.abs(np.array(arm["qd"])).max(axis=0) / most
         assert arm["figures"]["speed_share"] == pytest.approx(share.max(), rel=1e-2)
         assert arm["figures"]["speed_joint"] == share.argmax() + 1
-    assert fast["arms"]["ARM_1"]["figures"]["way"] == pytest.approx(slow["arms"]["ARM_1"]["figures"]["way"], rel=1e-4)
+    assert fast["arms"]["ARM_1"]["figures"]["path_length"] == pytest.approx(
+        slow["arms"]["ARM_1"]["figures"]["path_length"], rel=1e-4
+    )
 
 
 def test_devices(tmp_path: Path) -> None:
@@ -407,6 +412,29 @@ def test_what_a_camera_sees() -> None:
     assert "no camera" in studio.state(1)["refusal"]
 
 
+def test_a_run_with_physics() -> None:
+    """Parts are shown where they are in the world, and measured beside planned."""
+    pytest.importorskip("cv2")
+    file = CellFile(EXAMPLES / "vision_cell.toml")
+    studio = Studio(Project(Workbench(file.cell), file, EXAMPLES / "stack_by_vision.rlo"))
+    studio.workbench.warm_up()
+    studio.page_opened(1)
+    studio.receive(json.dumps({"do": "run", "physics": True, "rate": 4}), 1, 0.0)
+    for k in range(60):
+        studio.tick(k / 20, 1 / 20)
+    run = studio.project.run
+    assert run is not None
+    state, hardware = studio.state(1), run._computed.machine.hardware
+    assert isinstance(hardware, PhysicsCell)
+    assert state["picture"]["found"]
+    motion = state["run"]["motions"]["ARM_1"]
+    np.testing.assert_allclose(motion["q_measured"], motion["q"], atol=1e-2)
+    np.testing.assert_allclose(studio.workbench.arms["ARM_1"].q, motion["q_measured"], atol=1e-5)
+    tracks = hardware.observations().parts
+    for name, X in studio.workbench.part_poses().items():
+        np.testing.assert_allclose(X, tracks[name].at(run.time + 1e-9)[1], atol=1e-9)
+
+
 def test_a_process_steps(tmp_path: Path) -> None:
     """Of two processes that stand the one that is named steps, and the other stays."""
     text = (
@@ -423,11 +451,11 @@ def test_a_process_steps(tmp_path: Path) -> None:
 
     other = next(name for name, line in lines().items() if line == 6)
     for line in (7, 8):
-        assert pages.send("go", way="next", process=other) == ""
+        assert pages.send("go", step="next", process=other) == ""
         pages.wait(2.0)
         assert lines()[other] == line
         assert 5 in lines().values()
-    assert f"Did you mean '{other}'" in pages.send("go", way="next", process=f"{other}x")
+    assert f"Did you mean '{other}'" in pages.send("go", step="next", process=f"{other}x")
 
 
 def test_run_from_here(pages: Pages) -> None:
@@ -509,7 +537,7 @@ def test_a_run_that_fails(tmp_path: Path) -> None:
     run = pages.state()["run"]
     assert (run["ended"], run["reason"], run["lines"][0]["line"]) == (False, "exception", 5)
     assert "out of reach" in run["text"]
-    pages.send("go", way="continue")
+    pages.send("go", step="continue")
     pages.wait(0.1)
     assert pages.state()["run"]["reason"] == "failed"
     assert pages.send("stop") == ""

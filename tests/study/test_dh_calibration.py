@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from armwright.study import dh_calibration as study
+from armwright.study.dh_calibration_study import DhCalibration
 
 
 def test_board() -> None:
@@ -22,9 +23,29 @@ def test_the_true_arm_touches_the_points() -> None:
     np.testing.assert_allclose(study.chain().forward(data.q, study.truth()).position, data.points, atol=1e-9)
 
 
-def test_verification() -> None:
+@pytest.fixture(scope="module")
+def verification() -> list[study.Row]:
+    return study.verification_table()
+
+
+def test_headline(verification: list[study.Row]) -> None:
+    """The page begins with the error of the nominal arm and of the best fit of each model."""
+    numbers = [*DhCalibration(verification=verification, parameters=[]).headline()]
+
+    means = {
+        name: [row.mean for row in verification if row.model == name] for name in ("nominal", "thesis", "complete")
+    }
+    assert [tile.value for tile in numbers[:3]] == [
+        f"{means['nominal'][0]:.1f} mm",
+        f"{min(means['thesis']):.3g} mm",
+        f"{min(means['complete']):.3g} mm",
+    ]
+    assert numbers[3].value == "16.4 mm"
+
+
+def test_verification(verification: list[study.Row]) -> None:
     """The arm is off by what the thesis' is; its fit leaves millimetres, the complete model takes 95 % away."""
-    rows = {(row.model, row.points): row for row in study.verification_table()}
+    rows = {(row.model, row.points): row for row in verification}
 
     first = rows["nominal", "none"]
     assert first.mean == pytest.approx(np.mean(study.PRINTED["nominal"]), rel=0.05)

@@ -1,6 +1,7 @@
 """The project on the PUMA's trajectories: its formulas, its figures, and what its moves ask of the joints."""
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -201,10 +202,15 @@ def test_command(study: PumaMoves, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {
         "figure25.gif",
         "tables.json",
+        "report.html",
         "run.json",
     }
     for name in names:
         assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
     tables = json.loads((tmp_path / "tables.json").read_text())
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"<figcaption>Figure (\d+):", page) == [*map(str, numbers), "25"]
+    assert page.count('<img src="data:image/gif;base64,') == 1
+    assert f"<b>{tables['moves'][0]['slower']:.1f} x</b><small>slower within the limits: joint move</small>" in page
     assert [row["inverse"] for row in tables["moves"]] == [3, 501, 501, 501]
     assert "no single branch of the inverse kinematics can be followed to the last pose" in done.stdout

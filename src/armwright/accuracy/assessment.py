@@ -24,6 +24,18 @@ from armwright.errors import InvalidValueError, listed, one_of
 from armwright.files.result_table import ResultTable
 
 _AXES = "xyz"
+# What the standard asks a report to say beside the numbers, by the words of ``--about``.
+CONDITIONS = {
+    "robot": "Robot, serial number",
+    "load": "Load",
+    "speed": "Speed",
+    "temperature": "Ambient temperature",
+    "instrument": "Measuring instrument",
+    "operator": "Operator",
+    "date": "Date of the measurement",
+}
+# Decimals of readings in mm and degrees that are told apart; and the difference of equal numbers at most.
+_MAX_DECIMALS, _EQUAL = 3, 1e-6
 # How many tests a note names.
 _MAX_NAMED_TESTS = 4
 
@@ -36,11 +48,13 @@ class Assessment:
         measures: in the order of the tests.
         results: for each test, in their order, what its functions returned.
         tests: as they were read.
+        about: what was said of the conditions of the tests, by the words of ``CONDITIONS``.
     """
 
     measures: tuple[Characteristic, ...]
     results: tuple[tuple[Result, ...], ...]
     tests: tuple[AnyTest, ...]
+    about: Mapping[str, str] = attrs.field(factory=dict)
 
     @property
     def planar(self) -> bool:
@@ -56,6 +70,24 @@ class Assessment:
     def exceeded(self) -> tuple[Characteristic, ...]:
         """The measures that do not keep their limits."""
         return tuple(measure for measure in self.measures if measure.holds is False)
+
+    @property
+    def decimals(self) -> list[int]:
+        """The decimals of each measure in its unit, one for all of a unit.
+
+        Lengths and angles have one decimal more than the readings that they were made of, other units of a test as many
+        as give the largest of them four digits.
+        """
+        readings = _reading_decimals(self.tests)
+        largest: dict[tuple[str, ...], float] = {}
+        groups = [(one.test, one.name, one.condition, one.unit) for one in self.measures]
+        for group, one in zip(groups, self.measures, strict=True):
+            if math.isfinite(one.value):
+                largest[group] = max(largest.get(group, 0.0), abs(one.value) * one.scale)
+        return [
+            readings[one.unit] + 1 if one.unit in readings else _four_digits(largest.get(group, 0.0))
+            for group, one in zip(groups, self.measures, strict=True)
+        ]
 
     @property
     def notes(self) -> list[str]:
@@ -81,13 +113,15 @@ class Assessment:
             }
             for measure in self.measures
         ]
-        return {"standard": "ISO 9283:1998", "planar": self.planar, "notes": self.notes, "measures": measures}
+        about = {"about": dict(self.about)} if self.about else {}
+        return {"standard": "ISO 9283:1998", **about, "planar": self.planar, "notes": self.notes, "measures": measures}
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give a table for each test, with a row for each measure; limits where any is stated."""
-        bounded = any(measure.limit is not None for measure in self.measures)
+        """Give a table for each test, with a row for each measure; limits where any of the test is stated."""
+        texts = iter([one.rounded(decimals) for one, decimals in zip(self.measures, self.decimals, strict=True)])
         for (test, name, condition), group in groupby(self.measures, attrgetter("test", "name", "condition")):
             measures = list(group)
+            bounded = any(measure.limit is not None for measure in measures)
             yield ResultTable(
                 title=f"{test} {name}{f', {condition}' if condition else ''}",
                 heads=("symbol", "measure", "value", "unit", "n", *(["limit"] if bounded else []), "note"),
@@ -96,7 +130,7 @@ class Assessment:
                         measure.symbol,
                         # The components of a measure need no words: AP_x below AP.
                         "" if "_" in measure.symbol else measure.what,
-                        measure.displayed_value,
+                        next(texts),
                         measure.displayed_unit,
                         measure.displayed_cycles,
                         *([measure.displayed_limit] if bounded else []),
@@ -149,6 +183,24 @@ def assess(
         for result in test_results:
             measures.extend(characteristics_of(test, result))
     return Assessment(measures=tuple(measures), results=tuple(results), tests=tuple(tests))
+
+
+def _reading_decimals(tests: Sequence[AnyTest]) -> dict[str, int]:
+    """Return the decimals of the readings by unit: of positions in mm, of angles in degrees."""
+    decimals = {"m": 0, "rad": 0}
+    for test in tests:
+        for part in test.clouds if isinstance(test, PoseTest) else test.runs:
+            for unit, values in (
+                ("m", part.positions * 1e3),
+                ("rad", np.degrees(() if part.angles is None else part.angles)),
+            ):
+                fits = (d for d in range(_MAX_DECIMALS) if np.allclose(values, values.round(d), rtol=0, atol=_EQUAL))
+                decimals[unit] = max(decimals[unit], next(fits, _MAX_DECIMALS))
+    return decimals
+
+
+def _four_digits(largest: float) -> int:
+    return max(0, 3 - math.floor(math.log10(largest))) if largest > 0 else 0
 
 
 def _test_title(test: AnyTest) -> str:

@@ -99,8 +99,15 @@ class Characteristic:
 
     @property
     def displayed_value(self) -> str:
-        """The value in that unit, plus or minus where it is one."""
-        value = f"{self.value * self.scale:.4g}" if np.isfinite(self.value) else "never"
+        """The value in that unit with four digits, plus or minus where it is one."""
+        return self._signed(f"{self.value * self.scale:.4g}")
+
+    def rounded(self, decimals: int) -> str:
+        """Return the value in that unit with so many decimals, plus or minus where it is one."""
+        return self._signed(f"{self.value * self.scale:z.{decimals}f}")
+
+    def _signed(self, text: str) -> str:
+        value = text if np.isfinite(self.value) else "never"
         return f"± {value}" if self.either_way else value
 
     @property

@@ -22,6 +22,7 @@ from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.joint_errors import largest_gravity_efforts
 from armwright.calibration.measurements import Measurements
+from armwright.calibration.noise import remarkable_readings
 from armwright.calibration.nongeometric import ModelComparison, NongeometricCalibration, calibrate_nongeometric
 from armwright.calibration.readings import Readings, refuse_unlocated
 from armwright.calibration.residuals import PoseError
@@ -108,13 +109,47 @@ class CalibrationAssessment:
         return {name: x[np.isfinite(x)] for name, x in kinds.items() if np.isfinite(x).any()}
 
     @property
+    def remarkable(self) -> tuple[int, ...]:
+        """The readings that were fitted to, counted from 0, whose residuals are too large for chance, largest first."""
+        return remarkable_readings(self.full.model.residuals(self.fitted, self.full.errors), self.full.noise)
+
+    @property
+    def fitted_names(self) -> tuple[str, ...]:
+        """Names of the readings that were fitted to."""
+        return tuple(self.measurements.names[i] for i in np.flatnonzero(~self.measurements.check))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the notes that a reader must not overlook."""
+        return (*(f"DOUBTFUL: {reason}" for reason in self.contradictions), *self._warnings_of_readings())
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know beside the numbers."""
         return (
             *(f"DOUBTFUL: {reason}" for reason in self.contradictions),
             *_notes_on_fit(self.full, self.measurements),
+            *self._warnings_of_readings(),
             _note_on_held_out(self.held_out, self.held_out_region),
             *([_note_on_nongeometric(self.nongeometric)] if self.nongeometric else []),
+        )
+
+    def _warnings_of_readings(self) -> Iterator[str]:
+        """Give the warnings of unusual readings: of the file, outliers, and those with a remarkable residual."""
+        yield from self.measurements.warnings
+        names, outliers = self.fitted_names, self.full.outliers
+        if outliers:
+            named = listed([names[i] for i in outliers], _MAX_NAMED)
+            yield f"outliers, without weight in the last fit: {named}"
+        remarkable = [i for i in self.remarkable if i not in outliers]
+        if not remarkable:
+            return
+        distance = self.full.after.distance
+        usual = float(np.median(distance))
+        shown = [f"{names[i]} ({distance[i] * 1e3:.3g} mm, {distance[i] / usual:.2g} times)" for i in remarkable]
+        yield (
+            f"readings with larger residuals than noise explains, beside a median of {usual * 1e3:.3g} mm: "
+            f"{listed(shown, _MAX_NAMED)}"
         )
 
     def as_data(self) -> dict[str, Any]:
@@ -131,6 +166,7 @@ class CalibrationAssessment:
             "noise": full.noise._asdict(),
             "degrees_of_freedom": full.degrees_of_freedom,
             "outliers": list(full.outliers),
+            "remarkable": list(self.remarkable),
             "distances": _mean_and_largest(self.distances),
             "angles": _mean_and_largest(self.angles),
             "iso9283": {
@@ -261,11 +297,10 @@ def assess_calibration(
 
 
 def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str]:
-    fitted = np.flatnonzero(~measurements.check)
     noise = f"the residuals have a standard deviation of {full.noise.length * 1e3:.3g} mm per coordinate"
     if measurements.readings.with_rotation.any():
         noise += f" and of {math.degrees(full.noise.angle):.3g} deg per axis"
-    yield f"{len(full.names)} errors fitted to {len(fitted)} readings; {noise}"
+    yield f"{len(full.names)} errors fitted to {int((~measurements.check).sum())} readings; {noise}"
     if any(name.startswith("base.") for name in full.names):
         base = full.chain.base
         x, y, z = base[:3, 3] * 1e3
@@ -274,10 +309,6 @@ def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str
             f"the errors base.* count from the best-fitted base of the nominal arm: at {x:z.4f}, {y:z.4f}, {z:z.4f} "
             f"mm, roll, pitch, yaw {angles} deg in the frame of the measurements"
         )
-    yield from measurements.warnings
-    if full.outliers:
-        names = [measurements.names[fitted[i]] for i in full.outliers]
-        yield f"outliers, without weight in the last fit: {listed(names, _MAX_NAMED)}"
 
 
 def _note_on_held_out(held_out: HeldOutErrors, region: HeldOutErrors | None) -> str:

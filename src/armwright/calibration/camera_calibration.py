@@ -72,8 +72,19 @@ class CameraCalibration:
         """What a reader must know beside the numbers."""
         return tuple(self._notes())
 
-    def _notes(self) -> Iterator[str]:
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the notes that a reader must not overlook: contradictions, and pictures without weight."""
+        return tuple(self._warnings())
+
+    def _warnings(self) -> Iterator[str]:
         yield from (f"DOUBTFUL: {reason}" for reason in self.contradictions)
+        if self.hand_eye is not None and self.hand_eye.wrong:
+            wrong = listed([self.hand_eye.names[i] for i in self.hand_eye.wrong], _MAX_NAMED)
+            yield f"pictures that contradict the others, without weight: {wrong}"
+
+    def _notes(self) -> Iterator[str]:
+        yield from self._warnings()
         if self.intrinsics is not None:
             yield (
                 f"{counted(len(self.intrinsics.views), 'picture')} with {len(self.intrinsics.residuals)} corners; the "
@@ -87,9 +98,6 @@ class CameraCalibration:
         if self.hand_eye is None:
             return
         fit = self.hand_eye
-        if fit.wrong:
-            wrong = listed([fit.names[i] for i in fit.wrong], _MAX_NAMED)
-            yield f"pictures that contradict the others, without weight: {wrong}"
         accuracy = fit.readings.accuracy
         stated = (
             f"{accuracy.position * 1e3:g} mm and {accuracy.orientation * 1e3:g} mrad"

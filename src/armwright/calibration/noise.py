@@ -21,6 +21,8 @@ from armwright.calibration.residuals import Residuals
 _QUANTILE = 0.9973
 # Those beyond twice as many sigmas are outliers, which do not count in the last fit.
 _OUTLIER_FACTOR = 2.0
+# One of so many readings is remarkable if chance gives any of them such a residual this rarely.
+_REMARKABLE = 0.01
 
 
 class Noise(NamedTuple):
@@ -96,6 +98,20 @@ def noise_and_outliers(residuals: Residuals, readings: int, fitted: int, *, robu
             outlying = _is_outlier(*_squares_by_reading(residuals.reading, scaled))
             counted = ~outlying[residuals.reading]
     return noise, outlying, max(1, int(counted.sum()) - fitted)
+
+
+def remarkable_readings(residuals: Residuals, noise: Noise) -> tuple[int, ...]:
+    """Return the readings whose residuals are too large for chance, the largest first; outliers are among them.
+
+    Args:
+        residuals: of the readings.
+        noise: of the measurement.
+    """
+    scaled = residuals.values / standard_deviations(residuals, noise)
+    square, size = _squares_by_reading(residuals.reading, scaled)
+    # Of as many readings as there are (Bonferroni).
+    rare = chi2.sf(square, np.maximum(size, 1)) * len(square) < _REMARKABLE
+    return tuple(i for i in np.argsort(-square).tolist() if rare[i])
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------

@@ -86,6 +86,12 @@ class ClearanceRun:
         return np.asarray(np.linalg.norm(self.error, axis=-1), dtype=np.float64)
 
     @property
+    def warnings(self) -> list[str]:
+        """Those of the notes that a reader must not overlook: all, unless the run is predictable to its end."""
+        certain = self.predictability is not None and self.predictability.to_the_end
+        return [note for note in self.notes if not (certain and note in _predictability_notes(self))]
+
+    @property
     def notes(self) -> list[str]:
         """What a reader must know beside the numbers."""
         notes = []

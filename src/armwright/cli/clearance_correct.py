@@ -7,7 +7,7 @@ from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
-from armwright.cli.output import print_result
+from armwright.cli.output import command_line, print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.shell_completion import paths
 
@@ -41,7 +41,7 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     Of pick-and-place the three nodes are moved; any other path is moved as one smooth curve. Each round simulates
     sixteen indistinguishable runs, or 32 linkages drawn from an estimate, and subtracts their mean error; printed are
     the path of the best round, and the remaining error with its spread over the runs. With -o the command writes
-    path.csv, summary.json and paths.svg.
+    path.csv, summary.json, paths.svg and a page, report.html.
 
     **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
     """
@@ -68,5 +68,5 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     settings = settings_of(friction_velocity, threshold_mm_s)
     assessment = assess_correction(model, path, clearances, settings, knots=knots, rounds=rounds, progress=print_error)
     if output is not None:
-        write_results(output, correction_files(assessment))
+        write_results(output, correction_files(assessment, command=command_line()))
     print_result(assessment, as_json=as_json, quiet=quiet, output=output, file="path.csv")

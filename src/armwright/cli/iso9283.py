@@ -37,6 +37,13 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     limit: Annotated[
         list[str] | None, Option(help="Limit of a characteristic, as in RP=0.05mm; may be repeated.")
     ] = None,
+    about: Annotated[
+        list[str] | None,
+        Option(
+            help="Condition of the tests for the report, as in robot='PUMA 560, no. 7'; may be repeated: robot, load, "
+            "speed, temperature, instrument, operator, date."
+        ),
+    ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     as_json: Json = False,
@@ -48,10 +55,13 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     stabilization and overshoot (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving, each with
     its number of cycles. A test with fewer cycles than the standard requires is refused without --few. A characteristic
     that exceeds its --limit ends the command with exit status 5 after everything is printed and written. With -o the
-    command writes report.html, measures.json and figures (SVG).
+    command writes report.html, measures.json and figures (SVG); conditions that are not stated with --about are lines
+    to fill in by hand on the page.
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
+    import attrs
+
     from armwright.accuracy.measurement_file import read_measurements
     from armwright.report.accuracy_files import accuracy_files
 
@@ -59,11 +69,12 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--band-mm", f"expected a number above 0, got {band_mm:g}")
     if not 0 <= corners_mm < float("inf"):
         raise usage_error("--corners-mm", f"expected 0 or a number above 0, got {corners_mm:g}")
-    bounds = _bounds(limit or [])
+    bounds, said = _bounds(limit or []), _conditions(about or [])
     for path in files:
         warn_of_stray(path)
     tests = read_measurements(files, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     assessment = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
+    assessment = attrs.evolve(assessment, about=said)
     if output is not None:
         title = f"ISO 9283: {', '.join(path.name for path in files)}"
         write_results(output, accuracy_files(assessment, title=title, command=command_line()))
@@ -106,6 +117,23 @@ def _bounds(texts: list[str]) -> dict[str, Named]:
         if not 0 <= bound.value < float("inf"):
             raise usage_error("--limit", f"expected {expected}, got {text}")
     return bounds
+
+
+def _conditions(texts: list[str]) -> dict[str, str]:
+    """Read conditions such as ``robot=PUMA 560``, by name."""
+    from armwright.accuracy.assessment import CONDITIONS
+
+    said: dict[str, str] = {}
+    for text in texts:
+        name, mark, words = (part.strip() for part in text.partition("="))
+        if not mark or not words or name not in CONDITIONS:
+            raise usage_error(
+                "--about", f"expected one of {', '.join(CONDITIONS)} with a text, load='2 kg'; got {text}"
+            )
+        if name in said:
+            raise usage_error("--about", f"{name} is said twice")
+        said[name] = words
+    return said
 
 
 def _in_si(assessment: "Assessment", symbol: str, value: float, unit: str) -> float:

@@ -1,5 +1,7 @@
 """``armwright studio``: the workbench in a browser."""
 
+import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,10 +16,10 @@ if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.studio.cell_file import CellFile
 
-_EMPTY = """name = "{name}"
+_EMPTY = """name = {name}
 
 [arms.ARM_1]
-model = "{model}"
+model = {model}
 joint_positions = [{start}]
 
 [frames]
@@ -46,11 +48,15 @@ def studio(
     from armwright.studio.workbench import Workbench
 
     shown, file = _cell(cell, new)
+    if program is None and new is not None and not new.with_suffix(".rlo").exists():
+        program = new.with_suffix(".rlo")
+    served = Studio(Project(Workbench(shown), file, program))
     try:
-        served = Studio(Project(Workbench(shown), file, program))
         serve(served, lambda address: _announce(address, open_it=open_browser), port)
     except OSError as error:
         raise usage_error("--port", f"port {port} cannot be listened on: {error.strerror or error}") from error
+    for name in served.project.unsaved():
+        typer.echo(f"armwright: the changes of {name} were not saved", err=True)
 
 
 def _announce(address: str, *, open_it: bool) -> None:
@@ -64,7 +70,6 @@ def _announce(address: str, *, open_it: bool) -> None:
 def _cell(name: str, new: Path | None) -> "tuple[Cell, CellFile | None]":
     """Return the cell to show, and the file that frames are taught into."""
     from armwright.arm.load import is_path, load_arm
-    from armwright.cell.model import Cell, CellArm
     from armwright.files.output import write_file
     from armwright.studio.cell_file import CellFile
 
@@ -75,13 +80,17 @@ def _cell(name: str, new: Path | None) -> "tuple[Cell, CellFile | None]":
     if is_cell:
         raise usage_error("--new", f"expected an arm to begin a cell with, got the cell {name}")
     arm = load_arm(name)
-    start = _bent(arm)
+    numbers = ", ".join(f"{value:.6g}" for value in _bent(arm))
+    place = Path(f"{arm.name}.toml") if new is None else new
+    # The path of an arm file is relative to the folder of the cell file; a name is text, whatever it has in it.
+    model = os.path.relpath(name, place.parent) if is_path(name) else name
+    text = _EMPTY.format(name=json.dumps(place.stem.replace("_", " ")), model=json.dumps(model), start=numbers)
     if new is None:
-        return Cell(name=arm.name, arms={"ARM_1": CellArm(arm=arm, start=start)}), None
+        file = CellFile(place, text)
+        return file.cell, file
     if new.exists():
         raise usage_error("--new", f"{new} exists already; open it by: armwright studio {new}")
-    numbers = ", ".join(f"{value:.6g}" for value in start)
-    write_file(new, _EMPTY.format(name=new.stem.replace("_", " "), model=name, start=numbers))
+    write_file(new, text)
     file = CellFile(new)
     return file.cell, file
 

@@ -5,7 +5,7 @@ from typing import Annotated
 from typer import Argument
 
 from armwright.cli.options import Json, OutputFolder
-from armwright.cli.output import json_text, print_result
+from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import listed_in
@@ -27,7 +27,7 @@ def study(
 ) -> None:
     """Repeat an experiment of the sources and print its published numbers beside the computed ones.
 
-    With -o the command writes the figures (SVG) and the tables (JSON).
+    With -o the command writes a page of figures and tables (report.html), the figures (SVG) and the tables (JSON).
 
     stanford-torque: the efforts of the Stanford arm during the report's motion by Newton-Euler, by Bejczy's model and
     with the largest payload (figures 3 to 11), and a verdict on every published constant.
@@ -49,5 +49,8 @@ def study(
     with parts() as progress, waiting(name, quiet=name in _WITH_BARS):
         result = run_study(name, progress)
     if output is not None:
-        write_results(output, {"tables.json": json_text(result.as_data()) + "\n", **result.figures()})
-    print_result(result, as_json=as_json, output=output, file="tables.json")
+        from armwright.report.study_page import study_files
+
+        title, drawn = f"{name}: {result.title}", result.figures()
+        write_results(output, study_files(result, result.headline(), drawn, title=title, command=command_line()))
+    print_result(result, as_json=as_json, output=output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,10 +54,10 @@ class Log:
         if tick % _BLOCK == _BLOCK - 1:
             self._full[arm].append(self._rows[arm])
             self._rows[arm] = np.empty_like(self._rows[arm])
-        self._count = tick + 1
 
     def add_parts(self, tick: int, data: Any) -> None:
-        """Record where parts are that have moved."""
+        """Record where parts are that have moved, after what all servos did at the tick."""
+        self._count = tick + 1
         if tick % self._every:
             return
         for name in self._parts:
@@ -70,10 +71,10 @@ class Log:
 
     def at(self, arm: str, tick: int) -> Measured:
         """Return what a servo did at a tick that has been recorded, or at the last one."""
-        tick = max(0, min(tick, self._count - 1))
-        block, row = divmod(tick, _BLOCK)
-        full = self._full[arm]
-        values = full[block][row] if block < len(full) else self._rows[arm][row]
+        block, row = divmod(max(0, min(tick, self._count - 1)), _BLOCK)
+        # Another thread may fill the latest block meanwhile, and put it behind the others.
+        latest, full = self._rows[arm], self._full[arm]
+        values = full[block][row] if block < len(full) else latest[row]
         n = (len(values) - 1) // 5
         return Measured(values[:n], values[n : 2 * n], values[2 * n : 3 * n], values[4 * n : 5 * n])
 
@@ -102,11 +103,9 @@ class Log:
 
     def tracks(self) -> dict[str, PartTrack]:
         """Return where the parts were."""
-        return {
-            name: PartTrack(
-                times=tuple(time for time, _ in track),
-                arms=(None,) * len(track),
-                poses=tuple(X for _, X in track),
-            )
-            for name, track in self._tracks.items()
-        }
+        return {name: _part_track(track) for name, track in self._tracks.items()}
+
+
+def _part_track(rows: Sequence[tuple[float, Array]]) -> PartTrack:
+    times, poses = zip(*rows, strict=True)
+    return PartTrack(times=times, arms=(None,) * len(rows), poses=poses)

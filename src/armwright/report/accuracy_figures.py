@@ -1,7 +1,8 @@
 """Figures of measured accuracy: clouds of poses, deviation along paths, settling, corners, speeds, weaving."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -19,22 +20,32 @@ from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, FigureBase
+
+_Draw: TypeAlias = Callable[["Figure", Any, Any], None]
 
 # Samples of a run that are drawn, and the drawn range about a corner, relative to its round-off or the shorter leg.
 _MAX_SAMPLES, _CORNER_RANGE, _LEG_SHARE = 2000, 5.0, 0.15
 _MARKS = "osD^v"
+# Room around the clouds of poses, and the bars of a histogram.
+_CLOUD_MARGIN, _BARS = 1.12, 10
+_CLOUD_CAPTION = (
+    "attained positions about the commanded one, all poses on one scale; below, distance from the barycentre cycle by "
+    "cycle, and how often"
+)
 
 
 def accuracy_drawings(assessment: Assessment) -> list[Drawing]:
     """Return the figures of an assessment, in the order of its tests."""
     drawn: list[Drawing] = []
+    cloud = partial(_draw_pose_cloud, half=_cloud_half_width(assessment))
+    functions: dict[type, tuple[_Draw, str]] = {**_DRAWING_FUNCTIONS, PoseRepeatability: (cloud, _CLOUD_CAPTION)}
     for test, results in zip(assessment.tests, assessment.results, strict=True):
         title = f"{test.name}{f', {test.condition}' if test.condition else ''}"
         for result in results:
-            if type(result) not in _DRAWING_FUNCTIONS:
+            if type(result) not in functions:
                 continue
-            draw, caption = _DRAWING_FUNCTIONS[type(result)]
+            draw, caption = functions[type(result)]
             kind = "velocity" if isinstance(result, PathVelocity) else test.kind
             figure = empty_figure((7.4, 4.2))
             draw(figure, test, result)
@@ -43,7 +54,7 @@ def accuracy_drawings(assessment: Assessment) -> list[Drawing]:
     return drawn
 
 
-def _plane_axes(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
+def _plane_axes(figure: "FigureBase", size: int) -> "list[tuple[Axes, int, int]]":
     """Return the axes for a plane or the two axes for space, with the coordinates that they show."""
     pairs = [(0, 1)] if size == 2 else [(0, 1), (0, 2)]
     views = []
@@ -55,19 +66,64 @@ def _plane_axes(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
     return views
 
 
-def _draw_pose_cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
+def _draw_pose_cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability, *, half: float) -> None:
     from matplotlib.patches import Circle  # noqa: PLC0415
 
     cloud = test.clouds[0]
-    assert cloud.commanded is not None  # noqa: S101 - every test of a pose has it
-    points, centre = (cloud.positions - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
-    for axis, i, j in _plane_axes(figure, test.size):
+    points, centre = _about_commanded(cloud.positions, test), _about_commanded(result.barycentre, test)
+    figure.set_size_inches(7.4, 6.4)
+    parts: Any = figure.subfigures(2, 1, height_ratios=(1.7, 1))
+    upper, lower = parts
+    middle = _cloud_middle(points)
+    for axis, i, j in _plane_axes(upper, test.size):
         axis.plot(points[:, i], points[:, j], "o", markersize=3.5, color="C0", label="attained")
         axis.plot(centre[i], centre[j], "s", markersize=6, color="C1", label="barycentre")
         axis.plot(0, 0, "+", markersize=13, markeredgewidth=1.8, color="C3", label="commanded")
-        circle = Circle((centre[i], centre[j]), result.radius * 1e3, fill=False, color="C1", linewidth=1.4)
+        circle = Circle((centre[i], centre[j]), result.radius * 1e3, fill=False, color="C1", linewidth=1.4, label="RP")
         axis.add_patch(circle)
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+        axis.set_aspect("equal", adjustable="box")
+        axis.set(xlim=(middle[i] - half, middle[i] + half), ylim=(middle[j] - half, middle[j] + half))
+    upper.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    trend, histogram = lower.subplots(1, 2, sharey=True, width_ratios=(3, 1))
+    distances = np.linalg.norm(points - centre, axis=1)
+    trend.plot(cloud.cycles, distances, "o-", markersize=3, linewidth=0.7, color="C0")
+    trend.axhline(float(distances.mean()), color="C7", linestyle="--", linewidth=1.2, label="mean")
+    trend.axhline(result.radius * 1e3, color="C1", linewidth=1.4, label="RP")
+    trend.set(xlabel="cycle", ylabel="from the barycentre, mm", ylim=(0, None))
+    trend.legend(fontsize="small", ncols=2, loc="upper left")
+    histogram.hist(distances, bins=_BARS, orientation="horizontal", color="C0", edgecolor="white")
+    histogram.set_xlabel("cycles")
+    for axis in (trend, histogram):
+        axis.locator_params(axis="x", integer=True)
+        axis.grid(visible=True, alpha=0.3)
+
+
+def _about_commanded(positions: Array, test: PoseTest) -> Array:
+    """Return positions relative to the commanded one of a test of a pose [mm]."""
+    commanded = test.clouds[0].commanded
+    assert commanded is not None  # noqa: S101 - every test of a pose has it
+    return (positions - commanded) * 1e3
+
+
+def _cloud_middle(points: Array) -> Array:
+    """Return the middle of attained positions and the commanded one, which is the origin."""
+    return np.asarray((np.minimum(points.min(axis=0), 0) + np.maximum(points.max(axis=0), 0)) / 2, dtype=np.float64)
+
+
+def _cloud_half_width(assessment: Assessment) -> float:
+    """Return half the width that the figures of all tests of poses show, so that they can be compared [mm]."""
+    half = 1e-6
+    for test, results in zip(assessment.tests, assessment.results, strict=True):
+        for result in results:
+            if isinstance(test, PoseTest) and isinstance(result, PoseRepeatability):
+                points, centre = (
+                    _about_commanded(test.clouds[0].positions, test),
+                    _about_commanded(result.barycentre, test),
+                )
+                middle = _cloud_middle(points)
+                circle = np.abs(centre - middle).max() + result.radius * 1e3
+                half = max(half, float(np.abs(points - middle).max()), float(np.abs(middle).max()), float(circle))
+    return _CLOUD_MARGIN * half
 
 
 def _draw_variation(figure: "Figure", test: PoseTest, result: Variation) -> None:
@@ -167,12 +223,8 @@ def _axes_without_offset(figure: "Figure", x: str, y: str) -> "Axes":
     return axis
 
 
-# The function that draws each kind of result, and the caption of the figure.
-_DRAWING_FUNCTIONS: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
-    PoseRepeatability: (
-        _draw_pose_cloud,
-        "attained positions about the commanded one, their barycentre, and the circle of RP",
-    ),
+# The function that draws each other kind of result, and the caption of the figure.
+_DRAWING_FUNCTIONS: dict[type, tuple[_Draw, str]] = {
     Variation: (_draw_variation, "attained positions by direction or robot, about the mean of all; barycentres filled"),
     PoseDrift: (_draw_drift, "AP and RP over time"),
     Settling: (

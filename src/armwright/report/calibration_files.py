@@ -8,8 +8,8 @@ import numpy as np
 from armwright.arm.write import toml_text
 from armwright.calibration.assessment import CalibrationAssessment
 from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf
-from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
-from armwright.report.static_page import static_page
+from armwright.report.calibration_page import calibration_page, length_residuals
+from armwright.report.figures import Drawing, empty_figure, plain_axes, plain_label, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +20,17 @@ _DISTANCES = {
     "calibrated, held out",
     "calibrated, all readings",
     "non-geometric, held out",
+}
+# What each file holds.
+_CONTENTS = {
+    "arm.toml": "the corrected arm as an arm file, with its base in the frame of the measurements",
+    "arm.urdf": "the corrected arm with every identified error",
+    "dh_standard.csv": "Denavit-Hartenberg parameters of arm.toml, standard convention",
+    "dh_modified.csv": "Denavit-Hartenberg parameters of arm.toml, modified convention",
+    "dh_hayati.csv": "parameters of arm.urdf with rotations about y",
+    "errors.json": "every error with its interval, the covariance, residuals before and after",
+    "residuals.svg": "residuals of each reading",
+    "distances.svg": "distances before and after, sorted",
 }
 
 
@@ -39,44 +50,36 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
     readings = len(assessment.held_out.distance)
     how = f"as calibrated with {readings} readings, without rotations about y; all errors are in errors.json"
     tables = {**corrected_tables(assessment.full), **corrected_tables(assessment.tabular)}
-    return {
+    files = {
         "arm.toml": f"# {assessment.arm.name} {how}\n{toml_text(corrected_arm(assessment.tabular))}\n",
         "arm.urdf": corrected_urdf(assessment.full),
         **{f"dh_{name}.csv": text for name, text in tables.items()},
         "errors.json": json.dumps(assessment.as_data(), indent=2) + "\n",
-        "report.html": static_page(
-            title=title,
-            command=command,
-            tables=assessment.tables(),
-            drawn=drawn,
-            notes=assessment.notes,
-            named=(
-                ("Arm", assessment.arm.title or assessment.arm.name),
-                ("Readings", str(readings)),
-                ("Errors fitted", str(len(assessment.full.names))),
-                ("Held out", f"{assessment.held_out.distance.mean() * 1e3:.4f} mm"),
-            ),
-        ),
         **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
     }
+    beside = {name: _CONTENTS[name] for name in files}
+    return {**files, "report.html": calibration_page(assessment, drawn, beside, title=title, command=command)}
 
 
 def _residuals_figure(assessment: CalibrationAssessment) -> "Figure":
-    measured = assessment.fitted
-    residuals = assessment.full.model.residuals(measured, assessment.full.errors)
+    measured, residuals = assessment.fitted, length_residuals(assessment)
     figure = empty_figure((7.4, 4.6))
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
-    size = np.bincount(residuals.reading[~residuals.is_rotation], minlength=len(measured))
-    number, millimetres = residuals.reading + 1, residuals.values * 1e3
-    points = ~residuals.is_rotation & (size[residuals.reading] == 3)
-    for i, (name, marker) in enumerate(zip("xyz", "o^s", strict=True)):
-        upper.plot(number[points][i::3], millimetres[points][i::3], marker, markersize=2.4, label=name, alpha=0.7)
-    others = ~residuals.is_rotation & (size[residuals.reading] == 1)
-    if others.any():
-        upper.plot(number[others], millimetres[others], ".", label="planes, distances", color="C4")
+    points = {i + 1: values * 1e3 for i, values in residuals.items() if len(values) == 3}
+    for axis, (name, marker) in enumerate(zip("xyz", "o^s", strict=True)):
+        along = [values[axis] for values in points.values()]
+        upper.plot([*points], along, marker, markersize=2.4, label=name, alpha=0.7)
+    others = [(i + 1, value * 1e3) for i, values in residuals.items() if len(values) != 3 for value in values]
+    if others:
+        upper.plot(*zip(*others, strict=True), ".", label="planes, distances", color="C4")
     upper.set(ylabel="residual, mm")
     upper.legend(ncols=4, fontsize="small", loc="upper right", markerscale=2)
-    lower.plot(np.arange(1, len(measured) + 1), assessment.held_out.distance * 1e3, ".", color="C3", markersize=3)
+    held_out = assessment.held_out.distance * 1e3
+    lower.plot(np.arange(1, len(measured) + 1), held_out, ".", color="C0", markersize=3)
+    for i in assessment.remarkable:
+        lower.plot(i + 1, held_out[i], "o", color="C3", markersize=6, fillstyle="none")
+        name = plain_label(assessment.fitted_names[i])
+        lower.annotate(name, (i + 1, held_out[i]), (6, -3), textcoords="offset points", fontsize="small", color="C3")
     if assessment.repeatability is not None:
         lower.axhline(assessment.repeatability.floor * 1e3, color="C2", label="repeatability")
         lower.legend(fontsize="small", loc="upper right")

@@ -1,6 +1,7 @@
 """The files of a calibration of a camera: lines of a cell file, all numbers, the corners, a page and its figures."""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from armwright.calibration.board import BoardView
 from armwright.calibration.camera_calibration import CameraCalibration
 from armwright.calibration.camera_tables import corners_text
 from armwright.files.pictures import read_grey_picture
+from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, empty_figure, plain_label, svg_text
 from armwright.report.static_page import static_page
 
@@ -18,6 +20,12 @@ if TYPE_CHECKING:
 
 # A residual of the median length is drawn as long as this part of the width of the picture.
 _ARROW = 0.02
+# What lies beside the page.
+_BESIDE = {
+    "camera.toml": "lines of a cell file: the camera with its lens and its pose",
+    "errors.json": "all numbers with standard errors and intervals",
+    "corners.csv": "the corners in the pictures",
+}
 # The longer side of a picture that is shown [px].
 _LONGEST = 800
 
@@ -55,9 +63,14 @@ def camera_files(
         "report.html": static_page(
             title=title,
             command=command,
-            tables=calibration.tables(),
-            drawn=drawn,
-            notes=calibration.notes,
+            sections=[
+                Card("Numbers", tables(calibration.tables())),
+                Card("Residuals", figures(drawn)),
+                Card("Files", downloads(_BESIDE | {f"{one.name}.svg": one.caption for one in drawn})),
+            ],
+            numbers=_tiles(calibration),
+            notes=[note for note in calibration.notes if note not in calibration.warnings],
+            warnings=calibration.warnings,
             named=(
                 ("Camera", calibration.name),
                 ("Pictures", str(count)),
@@ -67,6 +80,16 @@ def camera_files(
         ),
         **{drawing.name + ".svg": drawing.svg for drawing in drawn},
     }
+
+
+def _tiles(calibration: CameraCalibration) -> Iterator[Tile]:
+    """Give the residuals of the corners, how well the pictures agree with the arm, and the focal length."""
+    fit, alone = calibration.hand_eye, calibration.intrinsics
+    if alone is not None:
+        yield Tile(f"{alone.sigma:.3g} px", "standard deviation of a coordinate of a corner")
+    if fit is not None:
+        yield Tile(f"{fit.disagreement:.2f} x", "as far from the arm as its accuracy and the noise explain")
+    yield Tile(f"{calibration.lens.numbers[0]:.1f} px", "focal length along x")
 
 
 def _residuals_figure(calibration: CameraCalibration) -> "Figure":

@@ -4,7 +4,6 @@ Source:
     Thesis, figures 4.7, 4.8, 4.9 and 4.12.
 """
 
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,15 @@ from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_position
-from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain_axes, plain_label, svg_text
+from armwright.report.figures import (
+    Drawing,
+    empty_figure,
+    evenly_spaced,
+    plain_axes,
+    plain_label,
+    round_number,
+    svg_text,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +32,8 @@ _ERROR_SHARE, _MAX_POINTS = 0.2, 2500
 _SEGMENTS = 100
 # So many places of the path without play are tied to those of the same moment with it.
 _LINKS = 31
+# A label of y is read from below, so that its arrow points up.
+_UPWARDS = "y, mm \N{RIGHTWARDS ARROW}"
 # The spectrum is shown up to here [Hz].
 _MAX_FREQUENCY = 200.0
 
@@ -39,7 +48,7 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
         ("error", _draw_error, "Error of the tip over time"),
         ("spectrum", _draw_spectrum, "Amplitudes of the error: mean removed, up to 200 Hz"),
         ("forces", _draw_forces, "Forces between journals and bearings; a gap in a curve: the journal flies"),
-        ("energy", _draw_energy, "What impacts and friction have taken, and what the books lack"),
+        ("energy", _draw_energy, "Energy taken by impacts and friction, and the residual of the energy balance"),
     ):
         figure = empty_figure((7.4, 4.2))
         draw(figure, run)
@@ -60,14 +69,6 @@ def magnification_factor(points: Array, errors: Array, share: float) -> float:
     return round_number(share * size / largest) if largest > 0 else 1.0
 
 
-def round_number(x: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20 ... that is not above x; 1 for all below."""
-    if x < 1:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(x))
-    return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
-
-
 def _draw_path(figure: "Figure", run: ClearanceRun) -> None:
     simulation, factor = run.simulation, magnification(run)
     samples = evenly_spaced(run.rows, _MAX_POINTS)
@@ -83,7 +84,7 @@ def _draw_path(figure: "Figure", run: ClearanceRun) -> None:
     axis.plot(*actual.T, color="C0", linewidth=1.3, label=f"with play, error × {factor:g}")
     for k, label in ((0, "start"), (-1, "end")):
         axis.plot(*actual[k], "os"[k], color="C3", markersize=6, fillstyle="none", linestyle="", label=label)
-    axis.set(xlabel="x, mm", ylabel="y, mm")
+    axis.set(xlabel="x, mm \N{RIGHTWARDS ARROW}", ylabel=_UPWARDS)
     axis.set_aspect("equal", adjustable="datalim")
     axis.grid(visible=True, alpha=0.3)
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
@@ -109,10 +110,12 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
         axis.add_collection(lines)
         axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
         shown = (-1.12 * wall, 1.12 * wall)
-        axis.set(title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=shown, ylim=shown)
+        axis.set(
+            title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm \N{RIGHTWARDS ARROW}", xlim=shown, ylim=shown
+        )
         axis.set_aspect("equal")
         axis.grid(visible=True, alpha=0.3)
-    panels[0].set_ylabel("y, mm")
+    panels[0].set_ylabel(_UPWARDS)
     figure.colorbar(lines, ax=panels, label="time, ms", shrink=0.8)
 
 
@@ -159,7 +162,7 @@ def _draw_energy(figure: "Figure", run: ClearanceRun) -> None:
         ("lost in impacts", energy.impact_loss, "-"),
         ("lost in friction", energy.friction_loss, "--"),
         ("in the walls", energy.stored, "-."),
-        ("not explained", energy.imbalance, ":"),
+        ("residual of the balance", energy.imbalance, ":"),
     ):
         axis.plot(run.time[samples], track[: run.rows][samples], style, linewidth=1.4, label=name)
     axis.legend(fontsize="small")

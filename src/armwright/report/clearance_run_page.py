@@ -7,13 +7,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from string import Template
 from typing import Any
 
+import attrs
 import numpy as np
 
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_position
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
 from armwright.report.clearance_run_figures import magnification_factor
-from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
+from armwright.report.elements import (
+    Tile,
+    badge,
+    downloads,
+    facts,
+    figures,
+    headline,
+    pairs,
+    remarks,
+    table,
+    warnings as shown_warnings,
+)
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
 from armwright.report.stick_figure import thinned_rows
@@ -24,7 +36,11 @@ _MAX_ROWS, _ERROR_SHARE = 2600, 0.09
 _SCRIPTS = ("plane.js", "bearings.js", "charts.js", "clearance_run_charts.js", "clearance_run.js")
 _MICRO = 1e6
 # Figures that are not charts drawn by the scripts.
-_STATIC_FIGURES = ("path", "bearings", "spectrum", "workspace")
+_STATIC_FIGURES = ("path", "workspace", "bearings", "spectrum")
+# Which way the coordinates of the plane count.
+_DIRECTED = {"x mm": "x mm →", "y mm": "y mm ↑"}
+# What lies beside the page.
+_BESIDE = {"summary.json": "the summary of the run", "samples.csv": "all samples, in SI units"}
 
 
 def animation_data(run: ClearanceRun) -> dict[str, Any]:
@@ -46,7 +62,7 @@ def animation_data(run: ClearanceRun) -> dict[str, Any]:
         gaps_um: (r, 2 p) vectors from the centre of each bearing to that of its journal.
         forces_N: (r, p) contact forces; the largest since the previous row.
         flies: (r, p) 1 where a journal does not touch its bearing.
-        energy_J: (r, 6) driven, kinetic, potential, impact loss, friction loss, not explained.
+        energy_J: (r, 6) driven, kinetic, potential, impact loss, friction loss, residual of the balance.
         magnification: initial magnification of the displacements.
     """
     simulation, linkage = run.simulation, run.simulation.scenario.linkage
@@ -99,19 +115,22 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
     """
     data = run.as_data()
     pins, targets, totals = run.tables()
+    shown = [drawing for drawing in drawn if drawing.name in _STATIC_FIGURES]
     return page_html(
         title=title,
         badge=badge(data["status"], good=run.finished),
         facts=facts(_facts(data, command)),
-        notes=shown_notes(run.notes),
+        notes=shown_warnings(run.warnings),
         main=Template(asset("clearance_run.html")).substitute(
+            headline=headline(_tiles(run, data)) + remarks(note for note in run.notes if note not in run.warnings),
             pins=table(pins),
-            targets=table(targets),
+            targets=table(attrs.evolve(targets, heads=[_DIRECTED.get(head, head) for head in targets.heads])),
             totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
             settings=pairs(_settings(data)),
-            figures=figures(drawing for drawing in drawn if drawing.name in _STATIC_FIGURES),
+            figures=figures(sorted(shown, key=lambda drawing: _STATIC_FIGURES.index(drawing.name))),
+            files=downloads(_BESIDE | {f"{drawing.name}.svg": drawing.caption for drawing in drawn}),
         ),
-        styles=("clearance_run.css",),
+        styles=("figures.css", "clearance_run.css"),
         scripts=_SCRIPTS,
         data=animation_data(run),
         generated=f"armwright {__version__}: {command}",
@@ -152,12 +171,26 @@ def _motor_data(linkage: Linkage, body: str, points: Sequence[BodyPoint]) -> int
 # ---- texts ---------------------------------------------------------------------------------------------------------
 
 
+def _tiles(run: ClearanceRun, data: Mapping[str, Any]) -> Iterator[Tile]:
+    """Give the error of the tip, the largest force, free flight, and what the energy balance leaves."""
+    error, pins = data["error"], data["pins"]
+    yield Tile(f"{error['largest'] * 1e3:.4g} mm", "largest error of the tip")
+    yield Tile(f"{error['mean'] * 1e3:.4g} mm", "mean error of the tip")
+    peaks = {name: pin["peak_force"] for name, pin in pins.items()}
+    name = max(peaks, key=lambda pin: float("inf") if peaks[pin] is None else peaks[pin])
+    force = "∞" if peaks[name] is None else f"{peaks[name]:.4g}"
+    yield Tile(f"{force} N", f"largest contact force, in {name}")
+    yield Tile(str(sum(pin["impacts"] for pin in pins.values())), "impacts in all bearings")
+    if run.predictability is not None:
+        certain = run.predictability.to_the_end
+        until = "to the end" if certain else f"until {data['predictable_until'] * 1e3:.4g} ms"
+        yield Tile(until, "predictable", mark="" if certain else "warn")
+
+
 def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
     yield "Linkage", data["linkage"]
     yield "Path", f"{data['path']}, {data['duration']:.4g} s"
     yield "Clearance", ", ".join(f"{name} {pin['clearance'] * 1e3:.4g} mm" for name, pin in data["pins"].items())
-    if data["predictable_until"] is not None:
-        yield "Predictable until", f"{data['predictable_until']:.4g} s"
     yield "Command", command
 
 

@@ -3,6 +3,7 @@
 import base64
 import html
 import io
+import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.svg import normalize_svg
+from armwright.report.svg import inline_svg, normalize_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,11 +39,36 @@ class Drawing(NamedTuple):
     svg: str
 
     @property
+    def files(self) -> Mapping[str, str]:
+        """Its only file by name."""
+        return {f"{self.name}.svg": self.svg}
+
+    @property
     def element(self) -> str:
-        """The figure as an element of a page, which includes its data."""
-        data = base64.b64encode(self.svg.encode()).decode()
+        """The figure as an element of a page, in the colours of the page."""
         caption = html.escape(self.caption)
-        image = f'<img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
+        drawing = inline_svg(self.svg, self.name).replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)
+        return f"<figure>{drawing}<figcaption>{caption}</figcaption></figure>"
+
+
+class Film(NamedTuple):
+    """A film, in one or more formats.
+
+    Attributes:
+        name: name of its files without the suffix.
+        caption: its caption.
+        files: its files by name; a GIF is among them.
+    """
+
+    name: str
+    caption: str
+    files: Mapping[str, bytes]
+
+    @property
+    def element(self) -> str:
+        """The film as an element of a page, which includes its data."""
+        caption, data = html.escape(self.caption), base64.b64encode(self.files[f"{self.name}.gif"]).decode()
+        image = f'<img src="data:image/gif;base64,{data}" alt="{caption}">'
         return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
@@ -148,6 +174,14 @@ def set_equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) 
 def evenly_spaced(count: int, most: int) -> Array:
     """Return the indices of at most this many rows, evenly distributed, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, most).astype(int))
+
+
+def round_number(x: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20 ... that is not above x; 1 for all below."""
+    if x < 1:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(x))
+    return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
 
 
 def svg_text(figure: "Figure", title: str = "") -> str:

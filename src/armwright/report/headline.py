@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import html
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import attrs
+from armwright.report.elements import Tile
 
 if TYPE_CHECKING:
     from armwright.report.page import ArmRecord, RunPage, StageRow
@@ -18,43 +17,14 @@ _NAMED = 2
 _TOLERANCE = 1e-6
 
 
-@attrs.frozen
-class Figure:
-    """A number with its name.
-
-    Attributes:
-        value: with its unit.
-        label: what it is.
-        title: more about it.
-        mark: ``warn`` or ``bad`` where it needs attention, else empty.
-    """
-
-    value: str
-    label: str
-    title: str = ""
-    mark: str = ""
-
-
-def headline_list(figures: Iterable[Figure]) -> str:
-    """Return figures as the HTML text of a list."""
-
-    def item(figure: Figure) -> str:
-        title = f' title="{html.escape(figure.title)}"' if figure.title else ""
-        name = f"figure {figure.mark}".strip()
-        value, label = html.escape(figure.value), html.escape(figure.label)
-        return f'<li class="{name}"{title}><b>{value}</b><small>{label}</small></li>'
-
-    return f'<ul class="headline" aria-label="In short">{"".join(map(item, figures))}</ul>'
-
-
-def headline(data: RunPage) -> Iterator[Figure]:
+def run_headline(data: RunPage) -> Iterator[Tile]:
     """Yield the numbers of a run that are known.
 
     Args:
         data: of its page.
     """
     finished = data.status == "finished"
-    yield Figure(f"{data.duration:.2f} s", "cycle time" if finished else "until the failure", data.status)
+    yield Tile(f"{data.duration:.2f} s", "cycle time" if finished else "until the failure", data.status)
     arms = {arm.name: arm for arm in data.arms}
     yield from _peak_effort(data, arms)
     yield from _tracking(data)
@@ -64,7 +34,7 @@ def headline(data: RunPage) -> Iterator[Figure]:
         yield _limits(data)
 
 
-def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Figure]:
+def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Tile]:
     shares = [
         (effort / joint.effort, stage, joint.name)
         for stage in data.stages
@@ -75,10 +45,10 @@ def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Figure]:
     if shares:
         share, stage, joint = max(shares, key=lambda one: one[0])
         label = f"peak effort, {_of(data, stage)}{joint}"
-        yield Figure(f"{share:.0%}".replace("%", " %"), label, _during(stage), "bad" if share > 1 + _TOLERANCE else "")
+        yield Tile(f"{share:.0%}".replace("%", " %"), label, _during(stage), "bad" if share > 1 + _TOLERANCE else "")
 
 
-def _tracking(data: RunPage) -> Iterator[Figure]:
+def _tracking(data: RunPage) -> Iterator[Tile]:
     """Yield the largest tracking error of revolute joints."""
     worst = [
         (float(arm.measured.worst[j]), float(arm.measured.worst_t[j]), arm.name, joint.name)
@@ -89,19 +59,19 @@ def _tracking(data: RunPage) -> Iterator[Figure]:
     ]
     if worst:
         error, t, arm, joint = max(worst)
-        yield Figure(f"{error * 1e3:.2f} mrad", f"largest tracking error, {joint}", f"{arm} at {t:.2f} s")
+        yield Tile(f"{error * 1e3:.2f} mrad", f"largest tracking error, {joint}", f"{arm} at {t:.2f} s")
 
 
-def _deviation(data: RunPage) -> Iterator[Figure]:
+def _deviation(data: RunPage) -> Iterator[Tile]:
     """Yield the largest deviation from a line; from paths past frames, whose corners are rounded, only without one."""
     known = [(stage.deviation, i) for i, stage in enumerate(data.stages) if stage.deviation is not None]
     stages = [one for one in known if data.stages[one[1]].kind in {"LINE", "HAND"}] or known
     if stages:
         deviation, i = max(stages)
-        yield Figure(f"{deviation * 1e3:.2f} mm", "largest path deviation", _during(data.stages[i]))
+        yield Tile(f"{deviation * 1e3:.2f} mm", "largest path deviation", _during(data.stages[i]))
 
 
-def _distance(data: RunPage) -> Iterator[Figure]:
+def _distance(data: RunPage) -> Iterator[Tile]:
     near = [(one.distance, i) for i, stage in enumerate(data.stages) if (one := stage.clearance) and one.distance]
     near += [(0.0, i) for i, stage in enumerate(data.stages) if (one := stage.clearance) and one.distance == 0]
     if near:
@@ -110,14 +80,14 @@ def _distance(data: RunPage) -> Iterator[Figure]:
         assert clearance is not None  # noqa: S101 - it has a distance
         mark = "warn" if distance < data.clearance or distance <= 0 else ""
         bodies = " – ".join(clearance.bodies)
-        yield Figure(f"{distance * 1e3:.1f} mm", "least distance", f"{bodies}, at {clearance.t:.2f} s", mark)
+        yield Tile(f"{distance * 1e3:.1f} mm", "least distance", f"{bodies}, at {clearance.t:.2f} s", mark)
         return
     bounds = [stage.clearance.bound for stage in data.stages if stage.clearance is not None]
     if bounds:
-        yield Figure(f"> {min(bounds) * 1e3:.0f} mm", "least distance")
+        yield Tile(f"> {min(bounds) * 1e3:.0f} mm", "least distance")
 
 
-def _limits(data: RunPage) -> Figure:
+def _limits(data: RunPage) -> Tile:
     """Return which limits joints reach, and of which joints."""
     several = len(data.arms) > 1
     shares: dict[str, float] = {}
@@ -128,10 +98,10 @@ def _limits(data: RunPage) -> Figure:
     beyond = [name for name, share in shares.items() if share > 1 + _TOLERANCE]
     names = beyond or list(shares)
     if not names:
-        return Figure("none", "limits reached")
+        return Tile("none", "limits reached")
     shown = ", ".join(names) if len(names) <= _NAMED else f"{len(names)}"
     title = ", ".join(f"{name} {shares[name]:.0%}" for name in names)
-    return Figure(shown, "limits exceeded" if beyond else "limits reached", title, "bad" if beyond else "warn")
+    return Tile(shown, "limits exceeded" if beyond else "limits reached", title, "bad" if beyond else "warn")
 
 
 def _of(data: RunPage, stage: StageRow) -> str:

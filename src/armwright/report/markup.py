@@ -23,6 +23,15 @@ _REPEATED_ROW = 0
 _NO_SCRIPTS_NOTE = (
     '<noscript><p class="empty">This page draws with a script of its own; please allow scripts for it.</p></noscript>'
 )
+# The scripts of a page, and their data.
+_SCRIPT = """\
+<script type="application/json" id="data">$data</script>
+<script>
+(() => {
+"use strict";
+$script
+})();
+</script>"""
 
 
 def page_html(
@@ -36,6 +45,7 @@ def page_html(
     styles: Sequence[str] = (),
     scripts: Sequence[str] = (),
     data: object = None,
+    film: bool = True,
 ) -> str:
     """Return a page: the head and heading of all pages, and its own parts below them.
 
@@ -48,17 +58,19 @@ def page_html(
         notes: HTML text below the heading, items of a list.
         styles: names of style sheets beyond the common one.
         scripts: names of the page's scripts, in the order in which the browser reads them: each uses only earlier
-            ones. A page with scripts has a clock.
+            ones.
         data: data of the scripts: attrs objects, mappings, sequences, arrays, strings, numbers, None.
+        film: whether a page with scripts has a clock, and what is moved by it.
 
     Returns:
         HTML text.
     """
-    film = ""
+    after = ""
     if scripts:
-        script = "\n".join(asset(name) for name in ("basics.js", "clock.js", *scripts))
-        film = Template(asset("film.html")).substitute(data=json_text(data), script=script)
-        styles = ("film.css", *styles)
+        moving = ("basics.js", "clock.js") if film else ()
+        script = "\n".join(asset(name) for name in (*moving, *scripts))
+        after = asset("film.html") * film + Template(_SCRIPT).substitute(data=json_text(data), script=script)
+        styles = ("film.css", *styles) if film else styles
     return Template(asset("page.html")).substitute(
         title=html.escape(title),
         script_policy="script-src 'unsafe-inline'; " if scripts else "",
@@ -69,7 +81,7 @@ def page_html(
         before=_NO_SCRIPTS_NOTE if scripts else "",
         main=main,
         generated=html.escape(generated),
-        after=film,
+        after=after,
     )
 
 

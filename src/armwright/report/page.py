@@ -15,8 +15,8 @@ from armwright.arm.model import JointKind
 from armwright.arrays import Array
 from armwright.report.animation import Animation
 from armwright.report.collision_text import NOT_CHECKED
-from armwright.report.elements import badge, facts
-from armwright.report.headline import headline, headline_list
+from armwright.report.elements import badge, facts, headline
+from armwright.report.headline import run_headline
 from armwright.report.limit_spans import LimitSpan
 from armwright.report.markup import asset, page_html
 
@@ -302,7 +302,7 @@ def run_page(data: RunPage) -> str:
         title=data.title,
         badge=badge(data.status, good=data.status == "finished"),
         facts=facts(_facts(data)),
-        main=Template(asset("run.html")).substitute(headline=headline_list(headline(data))),
+        main=Template(asset("run.html")).substitute(headline=headline(run_headline(data))),
         styles=("view.css", "run.css"),
         scripts=_SCRIPTS,
         data=data,

@@ -1,10 +1,8 @@
-"""A page that stands still: heading, notes, tables and figures."""
+"""A page that stands still: heading, headline numbers, notes, and sections of tables and figures."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from armwright.files.result_table import ResultTable
-from armwright.report.elements import badge, card, facts, figures, notes as shown_notes, table
-from armwright.report.figures import Drawing
+from armwright.report.elements import Card, Tile, badge, cards, facts, headline, remarks, warnings as shown_warnings
 from armwright.report.markup import page_html
 from armwright.version import __version__
 
@@ -13,35 +11,41 @@ def static_page(
     *,
     title: str,
     command: str,
-    tables: Iterable[ResultTable],
-    drawn: Iterable[Drawing] = (),
+    sections: Iterable[Card],
+    numbers: Iterable[Tile] = (),
     notes: Iterable[str] = (),
+    warnings: Iterable[str] = (),
     named: Iterable[tuple[str, str]] = (),
     verdict: tuple[str, bool] | None = None,
+    scripts: Sequence[str] = (),
+    data: object = None,
 ) -> str:
     """Return the whole text of a page, one HTML file that needs no other.
 
     Args:
         title: heading of the page.
         command: the command line that made it.
-        tables: in order; one without rows is left out.
-        drawn: its figures, below.
-        notes: what a reader must know beside the numbers.
+        sections: of the page, in order.
+        numbers: what a reader looks for first, above the sections.
+        notes: plain facts beside the numbers.
+        warnings: what a reader must not overlook.
         named: facts below the heading, by name.
         verdict: a word beside the heading, and whether it is a good one.
+        scripts: names of the scripts of views that can be turned; see ``page_html``.
+        data: of the scripts.
 
     Returns:
         HTML text; write it as UTF-8.
     """
-    cards = [card(shown.title, table(shown), remark=shown.remark) for shown in tables if shown.rows]
-    pictures = list(drawn)
-    if pictures:
-        cards.append(card("Figures", figures(pictures)))
     return page_html(
         title=title,
         badge="" if verdict is None else badge(verdict[0], good=verdict[1]),
         facts=facts(named),
-        notes=shown_notes(notes),
-        main="\n".join(cards),
+        notes=shown_warnings(warnings),
+        main="\n".join(filter(None, (headline(numbers), remarks(notes), cards(sections)))),
         generated=f"armwright {__version__}: {command}",
+        styles=("figures.css",),
+        scripts=scripts,
+        data=data,
+        film=False,
     )

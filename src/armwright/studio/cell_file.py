@@ -16,6 +16,7 @@ from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_text
 from armwright.files.output import write_back
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.spatial.poses import inverse, to_noap
 
 # Decimals of rotations and of positions [m] of frames, and of joint positions [rad], [m].
@@ -35,24 +36,31 @@ class CellFile:
 
     Attributes:
         path: of the file.
+        named: whether the file has a name; otherwise the path is a suggestion.
         text: with the changes.
         cell: as the text describes it.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read a file.
+    def __init__(self, path: Path, text: str | None = None) -> None:
+        """Read a file, or begin one.
+
+        Args:
+            path: of the file.
+            text: of a file that is not there yet, and has no name.
 
         Raises:
             FileFormatError: it is no cell file.
         """
-        self.path, self.cell = path, read_cell(path)
-        self.text = self._saved = read_text(path)
+        self.path, self.named = path, text is None
+        self.text = read_text(path) if text is None else text
+        self._saved = self.text if text is None else ""
+        self.cell = read_cell(path) if text is None else parse_cell(path, text)
         self._before: list[str] = []
 
     @property
     def changed(self) -> bool:
-        """Whether the text differs from the file."""
-        return self.text != self._saved
+        """Whether the text differs from the file; of one that is not there, whether anything has been taught."""
+        return self.text != self._saved if self.named else bool(self._before)
 
     # ---- changes -------------------------------------------------------------------------------------------------
 
@@ -141,7 +149,7 @@ class CellFile:
 
     def difference(self) -> str:
         """Return what saving would change in the file, as a unified diff; empty where it is nothing."""
-        if self.text == self._saved:
+        if not self.changed:
             return ""
         before, after = (text.splitlines(keepends=True) for text in (self._saved, self.text))
         return "".join(difflib.unified_diff(before, after, self.path.name, f"{self.path.name}, taught"))
@@ -189,6 +197,8 @@ class CellFile:
     def _check_name(name: str) -> None:
         if not _NAME.match(name):
             raise TeachingError(f"a name has letters, digits and _, and begins with a letter, got {name!r}")
+        if name.upper() in VOCABULARIES[Standard.RLO_2].reserved:
+            raise TeachingError(f"{name.upper()} is a word of the language and cannot be a name")
 
     def _take(self, document: Any) -> None:
         """Take a changed document, if it is a cell."""

@@ -62,13 +62,13 @@ def _arm_state(stream: Stream, placed: CellArm) -> dict[str, Any]:
 def _figures(stream: Stream, placed: CellArm, path: Array) -> dict[str, float | int | None]:
     """Return the figures of a motion.
 
-    They are the way of the tool [m], its highest speed [m/s], the work of the drives [J], and for speeds, accelerations
-    and efforts of joints the highest as a part of the limit, with the number of the joint.
+    Path length of the tool [m] and its highest speed [m/s], work of the drives [J], and the highest speed, acceleration
+    and effort of joints as a part of the limit, with the number of the joint.
     """
     limits, period = placed.arm.limits, float(stream.t[1] - stream.t[0]) if len(stream.t) > 1 else 1.0
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     figures: dict[str, float | int | None] = {
-        "way": float(steps.sum()),
+        "path_length": float(steps.sum()),
         "tool_speed": float(steps.max(initial=0.0)) / period,
         "work": float(np.abs(stream.tau * stream.qd).sum() * period),
     }

@@ -15,13 +15,14 @@ from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.revolutions import joint_distances
 from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.inverse_kinematics.solve import label
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.kinematics.singularity_analysis import determinant_factors, singularities
-from armwright.spatial.poses import inverse
-from armwright.spatial.rotations import rotation_vector
+from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 # A solution is one if its tool is as near to the pose [m], [rad].
 _MET = 1e-6
@@ -35,8 +36,14 @@ _SMALL = 0.03
 _AT_SINGULARITY = 1e-3
 # Joints that have at least this part in a motion that does not move the tool are named.
 _PART_OF_IDLE = 0.1
-# Steps of the numeric solution, and the damping in them [m].
-_STEPS, _DAMPING = 40, 0.02
+# Steps of the numeric solution, and the damping in them [m], and at least.
+_STEPS, _DAMPING, _LEAST_DAMPING = 40, 0.02, 1e-12
+# Numbers that describe a pose.
+_POSE = 6
+# A tool that is dragged far at once is led there in at most so many steps.
+_MOST_STRIDES = 16
+# Poses are the same within this: of the configuration that was found for one.
+_SAME = 1e-9
 
 Level: TypeAlias = Literal["note", "warning", "error"]
 
@@ -82,7 +89,7 @@ class LiveArm:
 
     Attributes:
         name: of the arm in the cell.
-        placed: the arm and its place.
+        placed: the arm, with its base.
         q: (n,) joint positions.
     """
 
@@ -91,6 +98,8 @@ class LiveArm:
         self.name, self.placed = name, placed
         self.q = np.array(placed.start)
         limits = placed.arm.limits
+        # An arm with fewer joints than a pose has numbers is led by the position of its tool alone.
+        self._rows = slice(0, 6 if placed.arm.n >= _POSE else 3)
         self.lower, self.upper = limits.lower, limits.upper
         revolute = np.array([joint.revolute for joint in placed.arm.joints])
         self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
@@ -115,10 +124,12 @@ class LiveArm:
         """How far from its base the tool could be if the arm were straight [m]."""
         arm = self.placed.arm
         slides = [
-            0.0 if joint.revolute or not math.isfinite(joint.limits.upper) else joint.limits.upper
+            0.0
+            if joint.revolute
+            else max((abs(x) for x in (joint.limits.lower, joint.limits.upper) if math.isfinite(x)), default=0.0)
             for joint in arm.joints
         ]
-        spans = (joint.span(abs(slide)) for joint, slide in zip(arm.joints, slides, strict=True))
+        spans = (joint.span(slide) for joint, slide in zip(arm.joints, slides, strict=True))
         return float(sum(spans)) + float(np.linalg.norm(arm.tool[:3, 3]))
 
     def warm_up(self) -> None:
@@ -145,7 +156,7 @@ class LiveArm:
         if self._geometry is None or self.equations is None:
             return [Solution(self.q, "numeric", "", here=True)]
         rows = self._branches(self.tool)
-        here = int(np.abs(rows - self.q).max(axis=1).argmin()) if len(rows) else -1
+        here = int(joint_distances(self.placed.arm, self.q, rows).argmin()) if len(rows) else -1
         labels = _labels(self._geometry, rows)
         return [
             Solution(q, labels[i], "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))), here=i == here)
@@ -156,14 +167,15 @@ class LiveArm:
         """Return the configurations (k, n) that bring the tool to a pose."""
         assert self.equations is not None  # noqa: S101 - asked for only then
         # A tool that is dragged is asked about twice: where it can be, and where it is.
-        if np.array_equal(X_WT, self._latest[0]):
-            return self._latest[1]
+        known, rows = self._latest
+        if known.shape == X_WT.shape and np.abs(X_WT - known).max() < _SAME:
+            return rows
         X_BT = inverse(self.placed.base) @ X_WT
         q, _ = self.equations.inverse_branches(X_BT, self.q)
         q = self.turned(q[self._is_met(self.equations.forward(q), X_BT)])
         # A branch that a pose does not have repeats another.
         same = np.abs(q[:, None] - q).max(axis=2, initial=0.0) < _MET
-        rows: Array = q[~np.tril(same, -1).any(axis=1)]
+        rows = np.asarray(q[~np.tril(same, -1).any(axis=1)])
         self._latest = np.array(X_WT), rows
         return rows
 
@@ -199,13 +211,34 @@ class LiveArm:
             UnreachableError: no configuration within the limits does that, or only one far from the present.
         """
         q = self.configuration_for(X_WT)
-        far = np.abs(q - self.q) > self._leap
-        if far.any() and not leaping:
-            joints = ", ".join(str(i + 1) for i in np.flatnonzero(far))
-            raise UnreachableError(
-                f"{self.name} would have to change its branch there: joint {joints} would leap; choose a solution"
-            )
+        if not leaping and (np.abs(q - self.q) > self._leap).any():
+            q = self._led_to(X_WT)
         self.q = q
+
+    def _led_to(self, X_WT: Array) -> Array:
+        """Return the configuration (n,) to which the tool is led on the straight line to a pose (4, 4), in strides.
+
+        Raises:
+            UnreachableError: a joint would leap on the line, or it leaves what can be reached.
+        """
+        start, before = self.tool, self.q
+        turn = rotation_vector(X_WT[:3, :3] @ start[:3, :3].T)
+        try:
+            for share in np.linspace(0.0, 1.0, _MOST_STRIDES + 1)[1:]:
+                R = rotation_from_vector(share * turn) @ start[:3, :3]
+                X = homogeneous(R, start[:3, 3] + share * (X_WT[:3, 3] - start[:3, 3]))
+                q = self.configuration_for(X_WT if share == 1.0 else X)
+                far = np.abs(q - self.q) > self._leap
+                if far.any():
+                    joints = ", ".join(str(i + 1) for i in np.flatnonzero(far))
+                    raise UnreachableError(
+                        f"{self.name} would have to change its branch there: joint {joints} would leap; "
+                        "choose a solution"
+                    )
+                self.q = q
+            return self.q
+        finally:
+            self.q = before
 
     def configuration_for(self, X_WT: Array) -> Array:
         """Return the configuration (n,) nearest to the present one that brings the tool to a pose (4, 4) in the world.
@@ -214,33 +247,43 @@ class LiveArm:
             UnreachableError: none within the limits does.
         """
         if self._geometry is None or self.equations is None:
-            return self._numeric(X_WT)
+            return self.stepped_to(X_WT, self.q)
         rows = self._branches(X_WT)
         if not len(rows):
             raise UnreachableError(f"out of reach of {self.name}")
         allowed = ((rows >= self.lower - 1e-9) & (rows <= self.upper + 1e-9)).all(axis=1)
-        distances = np.abs(rows - self.q).max(axis=1)
+        distances = joint_distances(self.placed.arm, self.q, rows)
         if not allowed.any():
             nearest = rows[distances.argmin()]
             raise UnreachableError("; ".join(map(str, violations_of(self.placed.arm, nearest.tolist()))))
         return np.asarray(np.clip(rows[np.where(allowed, distances, np.inf).argmin()], self.lower, self.upper))
 
-    def _numeric(self, X_WT: Array) -> Array:
-        """Return the configuration to which damped steps lead from the present one."""
-        X_BT, q = inverse(self.placed.base) @ X_WT, self.q
+    def stepped_to(self, X_WT: Array, q: Array) -> Array:
+        """Return the configuration (n,) to which damped steps lead from one (n,), with the tool at a pose (4, 4).
+
+        Raises:
+            UnreachableError: they lead nowhere.
+        """
+        X_BT = inverse(self.placed.base) @ X_WT
         for _ in range(_STEPS):
             X = inverse(self.placed.base) @ self.tool_at(q)
             error = np.concatenate([X_BT[:3, 3] - X[:3, 3], rotation_vector(X_BT[:3, :3] @ X[:3, :3].T)])
+            error = error[self._rows]
             if np.abs(error).max() < _MET / 10:
                 return q
-            J = self.jacobian_at(q)
-            step = J.T @ np.linalg.solve(J @ J.T + _DAMPING**2 * min(1.0, float(error @ error)) * np.eye(6), error)
+            J = self.jacobian_at(q)[self._rows]
+            damping = _DAMPING**2 * min(1.0, float(error @ error)) + _LEAST_DAMPING
+            step = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(len(error)), error)
             q = np.clip(q + step, self.lower, self.upper)
-        raise UnreachableError(f"{self.name} finds no way there: out of reach, or beyond a limit")
+        raise UnreachableError(f"{self.name} finds no configuration there: out of reach, or beyond a limit")
 
     def jacobian_at(self, q: Array) -> Array:
         """Return the Jacobian (6, n) at joint positions (n,), axes of the base."""
         return np.asarray(jacobian(self.placed.arm, q) if self.equations is None else self.equations.jacobian(q))
+
+    def scaled_jacobian(self, J: Array) -> Array:
+        """Return Jacobians (..., 6, n) with rows of one unit: an arm of another size has the same singular values."""
+        return scaled_rows(J, self.reach)
 
     # ---- what is wrong -------------------------------------------------------------------------------------------
 
@@ -248,7 +291,9 @@ class LiveArm:
         """Return what is to be said of the present configuration: joints near their limits, singular directions."""
         near = (self.q - self.lower < self._near) | (self.upper - self.q < self._near)
         found = [Remark("limit", "warning", self._limit_text(i), (i + 1,)) for i in np.flatnonzero(near).tolist()]
-        U, sigma, Vt = np.linalg.svd(scaled_rows(self.jacobian_at(self.q), 1.0))
+        if self.placed.arm.n < _POSE:
+            return found
+        U, sigma, Vt = np.linalg.svd(self.scaled_jacobian(self.jacobian_at(self.q)))
         if sigma[-1] < _SMALL * sigma[0]:
             found.append(self._singular(float(sigma[-1] / sigma[0]), U[:, len(sigma) - 1], Vt[len(sigma) - 1]))
         return found
@@ -279,14 +324,14 @@ class LiveArm:
 def _labels(geometry: ClosedFormGeometry, q: Array) -> list[str]:
     """Return the names of the branches that configurations (k, n) are in.
 
-    Branches meet where a factor of the determinant of the Jacobian vanishes: its signs tell them apart.
+    Branches meet where a factor of the determinant of the Jacobian vanishes: they differ in its signs.
     """
     angles = geometry.angles(list(q.T))
     side, second, flip = (np.where(factor >= 0, 1, -1).tolist() for factor in determinant_factors(geometry, angles))
     # The factor of an elbow falls where its angle grows.
-    way = 1 if geometry.family == "stanford" else -1
+    sign = 1 if geometry.family == "stanford" else -1
     rows = np.array(angles).T.tolist()
-    return [label(geometry, (side[i], way * second[i], flip[i]), row) for i, row in enumerate(rows)]
+    return [label(geometry, (side[i], sign * second[i], flip[i]), row) for i, row in enumerate(rows)]
 
 
 def _direction_text(twist: Array) -> str:

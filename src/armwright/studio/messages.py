@@ -42,14 +42,6 @@ class SetJoint:
 
 
 @attrs.frozen(kw_only=True)
-class SetJoints:
-    """Bring all joints of an arm to positions [rad] or [m]."""
-
-    arm: str
-    q: tuple[float, ...]
-
-
-@attrs.frozen(kw_only=True)
 class MoveTool:
     """Bring the tool to a pose in the world, twelve numbers n, o, a, p.
 
@@ -66,21 +58,25 @@ class MoveTool:
 
 @attrs.frozen(kw_only=True)
 class Jog:
-    """Move an arm steadily, until a moment after the latest of these messages.
+    """Move an arm steadily, until a moment after the latest of these messages; or by one step.
 
     Attributes:
         arm: name of the arm.
         frame: ``JOINT``, ``BASE``, ``TOOL``, ``WORLD`` or the name of a frame, whose axes are meant.
         axis: from 0: a joint; or x, y, z, then the rotations about them.
-        way: 1 or -1.
+        sign: 1 or -1.
         share: of the full jogging speed, above 0 to 1.
+        length: of one step along an axis or of a sliding joint [m]; 0 for steady motion.
+        angle: of one step about an axis or of a revolute joint [rad]; 0 for steady motion.
     """
 
     arm: str
     frame: str
     axis: int
-    way: Literal[1, -1]
+    sign: Literal[1, -1]
     share: float
+    length: float = 0.0
+    angle: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -166,9 +162,15 @@ class Unteach:
 
 @attrs.frozen(kw_only=True)
 class Save:
-    """Write the cell file or the program."""
+    """Write the cell file or the program; under a name in the working folder where it has none yet."""
 
     what: Literal["cell", "program"]
+    name: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Reload:
+    """Take the program as its file has it now; what has been changed since is lost."""
 
 
 @attrs.frozen(kw_only=True)
@@ -204,11 +206,13 @@ class InsertMove:
         approach: length of the straight line along the z axis of the goal that ends there [m]; 0 for none.
         departure: length of the straight line against the z axis of the tool by which it begins [m]; 0 for none.
         speed: 100 being normal.
+        teach: whether the frame is taught; otherwise the MOVE goes to where it is already.
     """
 
     arm: str
     frame: str
     line: int
+    teach: bool = True
     straight: bool = False
     approach: float = 0.0
     departure: float = 0.0
@@ -271,11 +275,11 @@ class Go:
     """Go on with a run, or a step on or back.
 
     Attributes:
-        way: how.
+        step: which.
         process: the name of the process that steps; the one that stands when left out.
     """
 
-    way: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
+    step: Literal["continue", "next", "in", "out", "stage", "tick", "back"]
     process: str = ""
 
 
@@ -368,7 +372,6 @@ class Describe:
 Command: TypeAlias = (
     Got
     | SetJoint
-    | SetJoints
     | MoveTool
     | Jog
     | Halt
@@ -383,6 +386,7 @@ Command: TypeAlias = (
     | Forget
     | Unteach
     | Save
+    | Reload
     | GoTo
     | SetText
     | InsertMove
@@ -408,7 +412,6 @@ Command: TypeAlias = (
 _COMMANDS: dict[str, type[Any]] = {
     "got": Got,
     "joint": SetJoint,
-    "joints": SetJoints,
     "tool": MoveTool,
     "jog": Jog,
     "halt": Halt,
@@ -423,6 +426,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "forget": Forget,
     "unteach": Unteach,
     "save": Save,
+    "reload": Reload,
     "go to": GoTo,
     "text": SetText,
     "insert": InsertMove,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
+from armwright.files.inputs import read_program
 from armwright.files.output import write_back
 from armwright.program.api import Compilation, compile as compile_program, import_reader
 from armwright.program.flow_analysis.side_effects import walk_statements
@@ -136,9 +139,12 @@ class ProgramText:
             offset: of the position.
 
         Raises:
+            ProgramTextError: the position is not in the text.
             MissingExtraError: the language server is not installed.
         """
         server = import_extra("armwright.program.language_server.completions", "completion", "studio", "lsprotocol")
+        if not 0 <= offset <= len(text):
+            raise ProgramTextError(f"expected a position from 0 to {len(text)}, got {offset}")
         codec = PositionCodec(text, UTF_32)
         items = server.completions(codec, self._analysis(codec), offset, snippets=False)[:_MOST_COMPLETIONS]
         return [
@@ -174,9 +180,21 @@ class ProgramText:
             OutputError: the file cannot be written, or somebody else has changed it meanwhile.
         """
         if self.path is None:
-            raise ProgramTextError("the program has no file; name one on the command line")
+            raise ProgramTextError("the program has no file yet; give it a name")
         write_back(self.path, self._saved, self.text, "program_mb")
         self._saved = self.text
+
+    def reload(self) -> None:
+        """Take the text that the file has now.
+
+        Raises:
+            ProgramTextError: it has no file.
+            FileFormatError: the file cannot be read.
+        """
+        if self.path is None:
+            raise ProgramTextError("the program has no file yet; give it a name")
+        self._saved = read_program(self.path)
+        self.replace(self._saved)
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 
@@ -354,6 +372,7 @@ class ProgramText:
         return {
             "version": self.version,
             "name": self.name,
+            "named": self.path is not None,
             "changed": self.changed,
             "runs": self.compiled.code is not None,
             "diagnostics": self._diagnostics,
@@ -373,3 +392,20 @@ class ProgramText:
                 for fix in it.fixes
             ],
         }
+
+
+def moved_lines(lines: Iterable[int], before: str, after: str) -> set[int]:
+    """Return where lines of a text, from 1, are in a changed one; those that are not there any more are left out."""
+    old, new = before.split("\n"), after.split("\n")
+    shortest = min(len(old), len(new))
+    head = next((i for i in range(shortest) if old[i] != new[i]), shortest)
+    tail = next((i for i in range(shortest - head) if old[-1 - i] != new[-1 - i]), shortest - head)
+    moved = {line: line for line in range(1, head + 1)}
+    moved |= {len(old) - i: len(new) - i for i in range(tail)}
+    changed = old[head : len(old) - tail], new[head : len(new) - tail]
+    for block in difflib.SequenceMatcher(None, *changed, autojunk=False).get_matching_blocks():
+        moved |= {head + block.a + i + 1: head + block.b + i + 1 for i in range(block.size)}
+    if len(changed[0]) == len(changed[1]):
+        # A line that is being written stays the same line.
+        moved |= {line: line for line in range(head + 1, len(old) - tail + 1) if line not in moved}
+    return {moved[line] for line in lines if line in moved}

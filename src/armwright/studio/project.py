@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
@@ -11,19 +12,21 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
-from armwright.errors import UnknownNameError
+from armwright.errors import UnknownNameError, shown
 from armwright.files.inputs import read_program
+from armwright.physics.camera_view import CameraView
 from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.physics.world import PhysicsCell
 from armwright.program.api import add_imported_frames
-from armwright.studio.camera_view import CameraView
 from armwright.studio.cell_file import CellFile, TeachingError
 from armwright.studio.comparison import KeptMotion, kept_motion
 from armwright.studio.program_run import ProgramRun
-from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError
+from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError, moved_lines
 from armwright.studio.workbench import Workbench
 
 _MOST_BREAKPOINTS = 1000
+# Names of files that pages may ask for: none leads out of the working folder.
+_FILE = re.compile(r"\w[\w-]{0,80}(\.\w{1,5})?", re.ASCII)
 
 
 class Project:
@@ -58,6 +61,7 @@ class Project:
         self.breakpoints: set[int] = set()
         self.devices: set[str] = set()
         self.compared: list[KeptMotion] = []
+        self._kept = 0
         self.executor: Executor | None = None
         self._camera_view: tuple[Cell, CameraView] | None = None
 
@@ -84,10 +88,14 @@ class Project:
         self._teach(name, self.workbench.arm(arm).tool, on)
 
     def _teach(self, name: str, X_WF: Array, on: str) -> None:
-        file, poses = self._teachable(), self.workbench.frame_poses()
-        if on != WORLD and on not in poses:
-            raise UnknownNameError("frame", on, [WORLD, *poses])
-        file.teach(name, X_WF, on, None if on == WORLD else poses[on])
+        # A program that has run may have moved the frame that is shown; the file has it where it is at the start.
+        file, on = self._teachable(), on.upper()
+        tree = file.cell.tree()
+        for each, arm in self.workbench.arms.items():
+            tree = tree.set_pose(each, arm.tool)
+        if on != WORLD and (on not in tree or on in self.workbench.arms):
+            raise UnknownNameError("frame", on, [it for it in tree if it not in self.workbench.arms])
+        file.teach(name, X_WF, on, None if on == WORLD else tree.world(on))
         self._taught(file)
 
     def rename(self, name: str, new: str) -> None:
@@ -108,25 +116,61 @@ class Project:
         file.undo()
         self._taught(file)
 
-    def save(self, what: str) -> None:
-        """Write the ``cell`` file or the ``program``."""
-        if what == "cell":
-            self._teachable().save()
-        else:
-            self.program.save()
+    def save(self, what: str, name: str = "") -> None:
+        """Write the ``cell`` file or the ``program``.
 
-    def insert_move(self, arm: str, frame: str, line: int, form: MoveForm) -> None:
-        """Teach a frame where the tool is, and insert a MOVE to it behind a line; both or neither."""
+        Args:
+            what: which.
+            name: of the file, in the working folder, where it has none yet.
+
+        Raises:
+            TeachingError: it has no name, or a file of this name is there already.
+            OutputError: it cannot be written, or somebody else has changed it meanwhile.
+        """
+        if what == "program":
+            self.program.path = self.program.path or _new_path(name, ".rlo")
+            self.program.save()
+            return
+        file = self._teachable()
+        if not file.named:
+            file.path, file.named = _new_path(name, ".toml"), True
+        file.save()
+
+    def unsaved(self) -> list[str]:
+        """Return the names of the files whose changes have not been written."""
+        texts = [(self.program.name, self.program.changed and bool(self.program.text.strip()))]
+        if self.file is not None:
+            texts.append((self.file.path.name, self.file.changed))
+        return [name for name, changed in texts if changed]
+
+    def insert_move(self, arm: str, frame: str, line: int, form: MoveForm, *, teach: bool) -> None:
+        """Insert a MOVE to a frame behind a line, and teach the frame where the tool is; both or neither.
+
+        Args:
+            arm: name of the arm.
+            frame: name of the frame.
+            line: from 1; see ``ProgramText.insert_move``.
+            form: of the MOVE.
+            teach: whether the frame is taught; otherwise it is one that there is.
+        """
         form.clauses(arm, frame)
+        self.workbench.arm(arm)
         self.program.require_statements()
-        self.teach(arm, frame)
+        if teach:
+            self.teach(arm, frame)
+        elif frame.upper() not in self.workbench.cell.tree():
+            raise UnknownNameError("frame", frame, self.workbench.cell.frames)
+        before = self.program.text
         self.program.insert_move(line, arm, frame.upper(), form)
+        self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
 
     def insert_via(self, arm: str, frame: str, line: int, blend: float) -> None:
         """Teach a frame where the tool is, and let the MOVE in a line go past it; both or neither."""
         self.program.check_via(line)
         self.teach(arm, frame)
+        before = self.program.text
         self.program.insert_via(line, frame.upper(), blend)
+        self.breakpoints = moved_lines(self.breakpoints, before, self.program.text)
 
     def teach_joints(self, arm: str, name: str) -> None:
         """Give a joint target the configuration of an arm; it is added where there is none."""
@@ -156,7 +200,9 @@ class Project:
         """
         if version != self.program.version:
             raise ProgramTextError("the program has been changed meanwhile; the newest text is shown")
+        before = self.program.text
         self.program.replace(text)
+        self.breakpoints = moved_lines(self.breakpoints, before, text)
 
     def set_breakpoint(self, line: int, *, on: bool) -> None:
         """Set or remove a breakpoint."""
@@ -219,11 +265,11 @@ class Project:
 
     def _known_devices(self) -> list[str]:
         """Return the devices of the cell, and those that a run has switched."""
-        switched = {} if self.run is None else self.run.devices()
+        switched = {} if self.run is None else self.run.happened.devices
         return sorted({*(self.workbench.cell.devices or ()), *switched})
 
     def _device_states(self) -> dict[str, bool]:
-        switched = dict.fromkeys(self.devices, True) if self.run is None else self.run.devices()
+        switched = dict.fromkeys(self.devices, True) if self.run is None else self.run.happened.devices
         return {name: switched.get(name, False) for name in self._known_devices()}
 
     def camera_picture(self, camera: str) -> Callable[[], bytes]:
@@ -239,6 +285,8 @@ class Project:
 
         def take() -> bytes:
             if self._camera_view is None or self._camera_view[0] is not cell:
+                if self._camera_view is not None:
+                    self._camera_view[1].close()
                 self._camera_view = cell, CameraView(cell)
             return self._camera_view[1].picture(camera, configurations, parts)
 
@@ -246,7 +294,8 @@ class Project:
 
     def keep_motion(self) -> None:
         """Keep the motion of the run, to be compared with another one; of three the first is forgotten."""
-        self.compared = [*self.compared, kept_motion(self.running().recording(), len(self.compared) + 1)][-2:]
+        self._kept += 1
+        self.compared = [*self.compared, kept_motion(self.running().recording(), self._kept)][-2:]
 
     def tick(self, seconds: float) -> bool:
         """Let the run go on for a time [s]; return whether anything has changed."""
@@ -260,8 +309,23 @@ class Project:
         if self.file is None:
             return None
         frames = list(self.file.cell.frames)
-        return {"name": self.file.path.name, "change": self.file.difference(), "frames": frames}
+        name, named = self.file.path.name, self.file.named
+        return {"name": name, "named": named, "change": self.file.difference(), "frames": frames}
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of it beside its files, as plain data."""
         return {"run": None if self.run is None else self.run.state(), "devices": self._device_states()}
+
+
+def _new_path(name: str, suffix: str) -> Path:
+    """Return the path of a file in the working folder that is to be made.
+
+    Raises:
+        TeachingError: the name is none, or a file of this name is there already.
+    """
+    if not _FILE.fullmatch(name):
+        raise TeachingError(f"a file name has letters, digits, - and _, got {shown(name)}")
+    path = Path(name if name.lower().endswith(suffix) else f"{name}{suffix}")
+    if path.exists():
+        raise TeachingError(f"{path} exists already; give another name")
+    return path

@@ -9,14 +9,13 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.spatial.poses import inverse
 from armwright.studio.live_arm import LiveArm, UnreachableError
 
 Plane: TypeAlias = Literal["xy", "xz", "yz"]
-# Points along either side, and points that are looked at between two states of a page.
-_SIDE, _BATCH = 61, 61
-# Beyond what an arm could reach if it were straight there is nothing to look at.
+# Points along either side: of arms with a closed form, whose points are solved a row at once, and of others.
+_SIDE, _COARSE_SIDE = 61, 31
+# The axes of a plane.
 _AXES: dict[Plane, tuple[int, int]] = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 # Of a point that cannot be reached at all, and of one that only a joint beyond its limits reaches.
 _OUT_OF_REACH, _BEYOND_LIMITS = 0, 1
@@ -31,19 +30,22 @@ class ReachMap:
         arm: name of the arm.
         plane: its axes.
         done: whether all of it is known.
+        known: how many of its points are.
     """
 
     def __init__(self, arm: LiveArm, plane: Plane) -> None:
         """Take a plane through the tool of an arm, where the arm stands now."""
-        self.arm, self.plane, self.done = arm.name, plane, False
-        self._live, self._tool = arm, arm.tool
+        self.arm, self.plane, self.done, self.known = arm.name, plane, False, 0
+        self._live, self._tool, self._q = arm, arm.tool, arm.q
+        self._batched = arm.equations is not None and arm.closed
+        self._side = _SIDE if self._batched else _COARSE_SIDE
         reach = arm.reach
         u, v = _AXES[plane]
         centre = arm.placed.base[:3, 3]
-        self._offsets = np.linspace(-reach, reach, _SIDE)
+        self._offsets = np.linspace(-reach, reach, self._side)
         self._axes, self._corner = (u, v), self._tool[:3, 3].copy()
         self._corner[[u, v]] = centre[[u, v]] - reach
-        self._values = np.zeros(_SIDE * _SIDE, dtype=np.uint8)
+        self._values = np.zeros(self._side**2, dtype=np.uint8)
         self._steps = self._work()
 
     def step(self) -> None:
@@ -55,15 +57,16 @@ class ReachMap:
 
     def _work(self) -> Iterator[None]:
         u, v = self._axes
-        rows, columns = np.divmod(np.arange(_SIDE * _SIDE), _SIDE)
-        poses = np.tile(self._tool, (_SIDE * _SIDE, 1, 1))
+        rows, columns = np.divmod(np.arange(self._side**2), self._side)
+        poses = np.tile(self._tool, (self._side**2, 1, 1))
         poses[:, :3, 3] = self._corner
         poses[:, u, 3] += self._offsets[columns] - self._offsets[0]
         poses[:, v, 3] += self._offsets[rows] - self._offsets[0]
-        batch = _BATCH if self._live.equations is not None and self._live.closed else 1
+        batch = self._side if self._batched else 1
         for first in range(0, len(poses), batch):
             part = slice(first, first + batch)
             self._values[part] = self._judged(poses[part])
+            self.known = first + batch
             yield
 
     def _judged(self, X_WT: Array) -> Array:
@@ -72,11 +75,11 @@ class ReachMap:
         if live.equations is None or not live.closed:
             return np.array([self._by_steps(X) for X in X_WT])
         X_BT = inverse(live.placed.base) @ X_WT
-        q, _ = live.equations.inverse_branches(X_BT, np.broadcast_to(live.q, (len(X_BT), len(live.q))), threads=1)
+        q, _ = live.equations.inverse_branches(X_BT, np.broadcast_to(self._q, (len(X_BT), len(self._q))), threads=1)
         met = np.abs(live.equations.forward(q, threads=1) - X_BT[:, None]).max(axis=(-2, -1)) < 1e-6
         turned = live.turned(q)
         allowed = met & ((turned >= live.lower - 1e-9) & (turned <= live.upper + 1e-9)).all(axis=-1)
-        sigma = np.linalg.svd(scaled_rows(live.equations.jacobian(turned, threads=1), 1.0), compute_uv=False)
+        sigma = np.linalg.svd(live.scaled_jacobian(live.equations.jacobian(turned, threads=1)), compute_uv=False)
         dexterity = np.where(allowed, sigma[..., -1] / sigma[..., 0], 0.0).max(axis=1)
         values = _level(dexterity)
         return np.where(allowed.any(axis=1), values, np.where(met.any(axis=1), _BEYOND_LIMITS, _OUT_OF_REACH))
@@ -84,10 +87,10 @@ class ReachMap:
     def _by_steps(self, X_WT: Array) -> int:
         """Return the value of a pose (4, 4) for an arm without a closed form: what is found from where it stands."""
         try:
-            q = self._live.configuration_for(X_WT)
+            q = self._live.stepped_to(X_WT, self._q)
         except UnreachableError:
             return _OUT_OF_REACH
-        sigma = np.linalg.svd(scaled_rows(self._live.jacobian_at(q), 1.0), compute_uv=False)
+        sigma = np.linalg.svd(self._live.scaled_jacobian(self._live.jacobian_at(q)), compute_uv=False)
         return int(_level(np.array(sigma[-1] / sigma[0])))
 
     def state(self) -> dict[str, Any]:
@@ -98,7 +101,7 @@ class ReachMap:
             "arm": self.arm,
             "plane": self.plane,
             "done": self.done,
-            "side": _SIDE,
+            "side": self._side,
             "corner": self._corner.tolist(),
             "u": (u * size).tolist(),
             "v": (v * size).tolist(),

@@ -172,7 +172,7 @@ class Server:
         if self.studio.receive(text, page.number, time.monotonic()):
             self._changed()
         while self.studio.jobs:
-            number, job = self.studio.jobs.pop()
+            number, job = self.studio.jobs.pop(0)
             task = asyncio.create_task(self._send_answer(number, job))
             self._sending.add(task)
             task.add_done_callback(self._sending.discard)

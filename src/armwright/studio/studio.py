@@ -1,4 +1,4 @@
-"""A studio: does what pages ask for, and tells them what to show."""
+"""A studio: carries out the commands of pages, and gives them the state to show."""
 
 from __future__ import annotations
 
@@ -9,21 +9,24 @@ from typing import Any
 
 from armwright.cell.observations import Picture
 from armwright.errors import ArmwrightError
+from armwright.program.debugger.debugger import DebuggerError
 from armwright.studio import messages as m
 from armwright.studio.control import Control
 from armwright.studio.downloads import download
 from armwright.studio.messages import MessageError, read_message
 from armwright.studio.program_text import MoveForm
 from armwright.studio.project import Project
+from armwright.studio.workbench import SLIDING, TURNING
 
 # Jogging stops so long after the latest message that keeps it going [s].
 _JOG_TIMEOUT = 0.25
 # How fast a run can be shown, 1 being real time.
 _RATES = (0.05, 8.0)
+# A map is sent again when so many points more are known.
+_MAP_POINTS = 200
 # What has to wait until a run has ended.
 _NOT_IN_A_RUN = (
     m.SetJoint,
-    m.SetJoints,
     m.MoveTool,
     m.Jog,
     m.TakeSolution,
@@ -89,6 +92,7 @@ class Studio:
             self._check(command, page)
             self._do_moving(command, page, now)
             self._do_teaching(command)
+            self._do_saving(command)
             self._do_running(command, page)
             self._answer(command, page)
             self._refusals.pop(page, None)
@@ -99,8 +103,12 @@ class Studio:
     def _check(self, command: m.Command, page: int) -> None:
         if page != self.control.page and not isinstance(command, m.AskForControl):
             raise MessageError("another page has control; ask for it")
-        if self.project.run is not None and isinstance(command, _NOT_IN_A_RUN):
-            raise MessageError("the program runs; stop it first")
+        run = self.project.run
+        if run is not None and isinstance(command, _NOT_IN_A_RUN):
+            if run.stop is None or not run.stop.has_ended:
+                raise MessageError("the program runs; stop it first")
+            # What has ended makes way for what comes next.
+            self.project.run = None
         if not self.workbench.ready:
             raise MessageError("the equations of the arm are being compiled; a moment, please")
 
@@ -109,8 +117,6 @@ class Studio:
         match command:
             case m.SetJoint():
                 bench.set_joint(command.arm, command.joint, command.value, now)
-            case m.SetJoints():
-                bench.set_joints(command.arm, command.q, now)
             case m.MoveTool():
                 bench.move_tool(command.arm, command.pose, now, leaping=command.leaping)
             case m.GoTo():
@@ -121,7 +127,11 @@ class Studio:
                 bench.arm(command.arm)
                 if not 0 < command.share <= 1:
                     raise MessageError(f"jog.share: expected above 0 to 1, got {command.share:g}")
-                self._jog, self._jog_until = command, now + _JOG_TIMEOUT
+                if command.length or command.angle:
+                    length, angle = (command.sign * value for value in (command.length, command.angle))
+                    bench.jog(command.arm, command.frame, command.axis, length, angle, now)
+                else:
+                    self._jog, self._jog_until = command, now + _JOG_TIMEOUT
             case m.Halt():
                 self._jog = None
             case m.Operate():
@@ -155,15 +165,20 @@ class Studio:
                 project.forget(command.name)
             case m.Unteach():
                 project.take_back()
-            case m.Save():
-                project.save(command.what)
             case m.InsertMove():
                 form = MoveForm(command.straight, command.approach, command.departure, command.speed)
-                project.insert_move(command.arm, command.frame, command.line, form)
+                project.insert_move(command.arm, command.frame, command.line, form, teach=command.teach)
             case m.InsertVia():
                 project.insert_via(command.arm, command.frame, command.line, command.blend)
             case m.TouchUp():
                 project.touch_up(command.line)
+
+    def _do_saving(self, command: m.Command) -> None:
+        match command:
+            case m.Save():
+                self.project.save(command.what, command.name)
+            case m.Reload():
+                self.project.program.reload()
 
     def _answer(self, command: m.Command, page: int) -> None:
         """Answer what a page asks for that changes nothing."""
@@ -171,8 +186,8 @@ class Studio:
         match command:
             case m.Keep():
                 self.workbench.arm(command.arm)
-                recording, what, arm = project.running().recording(), command.what, command.arm
-                self.jobs.append((page, lambda: download(recording, what, arm).message()))
+                run, what, arm = project.running(), command.what, command.arm
+                self.jobs.append((page, lambda: download(run.recording(), what, arm).message()))
             case m.Look():
                 take, camera = project.camera_picture(command.camera), command.camera
                 self.jobs.append((page, lambda: _picture_message(camera, take())))
@@ -187,9 +202,10 @@ class Studio:
         project = self.project
         match command:
             case m.SetText():
+                # A page whose text is not taken gets the one that there is.
+                self._sent.setdefault(page, {}).pop("source", None)
                 project.set_text(command.text, command.version)
-                # The page has it: it is not sent back.
-                self._sent.setdefault(page, {})["source"] = project.program.version
+                self._sent[page]["source"] = project.program.version
             case m.Break():
                 project.set_breakpoint(command.line, on=command.on)
             case m.Run():
@@ -197,7 +213,7 @@ class Studio:
                 project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
                 project.running().rate = rate
             case m.Go():
-                project.running().go(command.way, command.process)
+                project.running().go(command.step, command.process)
             case m.Pause():
                 project.running().pause()
             case m.Stop():
@@ -226,7 +242,8 @@ class Studio:
             return changed
         jog = self._jog
         try:
-            self.workbench.jog(jog.arm, jog.frame, jog.axis, jog.way * jog.share * seconds, now)
+            full = jog.sign * jog.share * seconds
+            self.workbench.jog(jog.arm, jog.frame, jog.axis, full * SLIDING, full * TURNING, now)
         except ArmwrightError as error:
             self.refuse(self.control.page, error)
         return True
@@ -234,10 +251,14 @@ class Studio:
     def _tick_run(self, seconds: float) -> bool:
         try:
             return self.project.tick(seconds)
-        except ArmwrightError as error:
-            self.project.run = None
+        except DebuggerError as error:
             self.refuse(self.control.page, error)
-            return True
+        except Exception as error:  # noqa: BLE001 - whatever ends a run, what has been taught is not lost with it
+            known = isinstance(error, ArmwrightError)
+            text = str(error) if known else f"the run ended by a mistake of armwright: {type(error).__name__}: {error}"
+            self.project.run = None
+            self.refuse(self.control.page, ArmwrightError(text))
+        return True
 
     def refuse(self, page: int | None, error: ArmwrightError) -> None:
         """Tell a page why what it began does not go on."""
@@ -260,7 +281,7 @@ class Studio:
         return state
 
     def _seldom_changed(self) -> dict[str, tuple[object, Callable[[], Any]]]:
-        """Return what is sent only when it changes: by its key in the state what tells that, and how it is had."""
+        """Return what is sent only when it changes, by its key in the state: what it depends on, and what makes it."""
         project, bench, run = self.project, self.workbench, self.project.run
         arms = bench.arms
         pictures = () if run is None else run.pictures()
@@ -275,12 +296,16 @@ class Studio:
             ),
             "source": (program.version, lambda: program.text),
             "map": (
-                (bench.map_number, bench.map is not None and bench.map.done),
+                (bench.map_number, bench.map is not None and (bench.map.done, bench.map.known // _MAP_POINTS)),
                 lambda: None if bench.map is None else bench.map.state(),
             ),
             "paths": (
-                (id(run), 0 if run is None else run.path_number),
+                (id(run), None if run is None else run.path_key),
                 lambda: {} if run is None else {name: run.path(name) for name in arms},
+            ),
+            "trace": (
+                (id(run), 0 if run is None else len(run.happened.begun), None if run is None else run.path_key),
+                lambda: [] if run is None else run.trace(),
             ),
             "compared": (
                 tuple(motion.number for motion in project.compared),

@@ -12,15 +12,15 @@ from typing import Any
 from armwright.arm.model import Arm
 from armwright.arrays import ArrayLike, joint_array
 from armwright.cell.model import Cell, CellArm
-from armwright.errors import KindError, shown
+from armwright.errors import ArmwrightError, KindError, shown
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.motion.moves import Move
 from armwright.motion.trajectory import Trajectory
 from armwright.program.vm.recording import Recording
+from armwright.report.motion_page import along_trajectory, motion_page
 from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
-from armwright.studio.motion_page import along_trajectory, motion_page
 from armwright.studio.page import studio_page
 from armwright.studio.project import Project
 from armwright.studio.studio import Studio
@@ -30,25 +30,27 @@ from armwright.studio.workbench import Workbench
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 _HEIGHT = 620
 _TICK = 1 / 30
+# After a longer pause of the kernel it does not leap [s].
+_LONGEST_TICK = 0.1
 # The only page of a widget.
 _PAGE = 1
 _SCRIPT = """
 export default {
   render({ model, el }) {
     const frame = document.createElement("iframe");
-    frame.sandbox = "allow-scripts";
+    frame.sandbox = "allow-scripts allow-forms allow-downloads";
     frame.style = `width:100%;height:${model.get("height")}px;border:0`;
     frame.srcdoc = model.get("page");
     const listen = (event) => {
       if (event.source === frame.contentWindow) model.send(event.data);
     };
-    const tell = (message) => frame.contentWindow?.postMessage(message, "*");
+    const push = (message) => frame.contentWindow?.postMessage(message, "*");
     window.addEventListener("message", listen);
-    model.on("msg:custom", tell);
+    model.on("msg:custom", push);
     el.append(frame);
     return () => {
       window.removeEventListener("message", listen);
-      model.off("msg:custom", tell);
+      model.off("msg:custom", push);
     };
   },
 };
@@ -122,29 +124,52 @@ def live_widget(cell: Cell) -> Any:
 
     widget = StudioWidget()
     widget.studio = studio
-    ticking: list[asyncio.Task[None]] = []
+    widget.on_msg(_Connection(studio, widget).receive)
+    return widget
 
-    def tell() -> None:
-        widget.send(json.dumps(studio.state(_PAGE), separators=(",", ":"), allow_nan=False))
 
-    async def tick() -> None:
-        while studio.moves:
-            await asyncio.sleep(_TICK)
-            if studio.tick(time.monotonic(), _TICK):
-                tell()
+class _Connection:
+    """Does for the page of a widget what a server does for the pages of a browser."""
 
-    def receive(_: object, content: object, __: object) -> None:
+    def __init__(self, studio: Studio, widget: Any) -> None:
+        self._studio, self._widget = studio, widget
+        self._ticking: asyncio.Task[None] | None = None
+
+    def receive(self, _: object, content: object, __: object) -> None:
+        """Do what the page asks for."""
         if not isinstance(content, str):
             return
-        if content == "hello" or studio.receive(content, _PAGE, time.monotonic()):
-            tell()
-        while studio.jobs:
-            _, job = studio.jobs.pop()
-            widget.send(json.dumps(job()))
-        ticking[:] = [task for task in ticking if not task.done()]
-        with contextlib.suppress(RuntimeError):
-            if studio.moves and not ticking:
-                ticking.append(asyncio.get_running_loop().create_task(tick()))
+        studio = self._studio
+        if content == "hello":
+            # Another view of the widget, or the same one again: it has nothing yet.
+            studio.page_closed(_PAGE)
+            studio.page_opened(_PAGE)
+            self._push()
+        elif studio.receive(content, _PAGE, time.monotonic()):
+            self._push()
+        self._answer()
+        if studio.moves and (self._ticking is None or self._ticking.done()):
+            # Without a loop, as in a script, nothing moves by itself.
+            with contextlib.suppress(RuntimeError):
+                self._ticking = asyncio.get_running_loop().create_task(self._tick())
 
-    widget.on_msg(receive)
-    return widget
+    def _push(self) -> None:
+        self._widget.send(json.dumps(self._studio.state(_PAGE), separators=(",", ":"), allow_nan=False))
+
+    def _answer(self) -> None:
+        while self._studio.jobs:
+            number, job = self._studio.jobs.pop(0)
+            try:
+                self._widget.send(json.dumps(job()))
+            except ArmwrightError as error:
+                self._studio.refuse(number, error)
+                self._push()
+
+    async def _tick(self) -> None:
+        before = time.monotonic()
+        while self._studio.moves:
+            await asyncio.sleep(_TICK)
+            now = time.monotonic()
+            if self._studio.tick(now, min(now - before, _LONGEST_TICK)):
+                self._push()
+            before = now

@@ -14,6 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell, base_name
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import UnknownNameError
+from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.physics.collisions import CellCollisions
 from armwright.physics.configuration_checks import ConfigurationChecks, NearBodies
 from armwright.spatial.poses import from_noap, homogeneous, to_noap
@@ -23,8 +24,10 @@ from armwright.studio.program_run import ProgramRun
 from armwright.studio.reach_map import Plane, ReachMap
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
-_TURNING, _SLIDING = math.radians(45.0), 0.25
-# Bodies nearer than this are told [m].
+TURNING, SLIDING = math.radians(45.0), 0.25
+# One step of a jog is no longer [m], [rad].
+_LONGEST_STEP = 0.1, math.radians(30.0)
+# Bodies nearer than this are reported [m].
 _NEAR = 0.02
 # Changes that can be taken back at most.
 _MOST_UNDONE = 200
@@ -85,61 +88,67 @@ class Workbench:
     # ---- moving --------------------------------------------------------------------------------------------------
 
     def set_joint(self, name: str, joint: int, value: float, now: float) -> None:
-        """Bring a joint, from 1, to a position [rad] or [m], as far as its limits allow."""
+        """Bring a joint, from 1, to a position [rad] or [m].
+
+        Raises:
+            UnreachableError: there is no such joint, or the position is beyond its limits.
+        """
         arm = self.arm(name)
         if not 1 <= joint <= len(arm.q):
             raise UnreachableError(f"{name} has joints 1 to {len(arm.q)}, got {joint}")
         q = arm.q.copy()
         q[joint - 1] = value
-        self._changing(arm, f"joint {joint}", now)
+        beyond = [it for it in violations_of(arm.placed.arm, q.tolist()) if it.joint == joint]
+        if beyond:
+            raise UnreachableError(str(beyond[0]))
+        before = arm.q
         arm.set_joints(q)
-
-    def set_joints(self, name: str, q: tuple[float, ...], now: float) -> None:
-        """Bring all joints of an arm to positions."""
-        arm = self.arm(name)
-        if len(q) != len(arm.q):
-            raise UnreachableError(f"{name} has {len(arm.q)} joints, got {len(q)} numbers")
-        self._changing(arm, "joints", now)
-        arm.set_joints(np.array(q))
+        self._changed(arm, before, f"joint {joint}", now)
 
     def move_tool(self, name: str, pose: tuple[float, ...], now: float, *, leaping: bool) -> None:
         """Bring the tool of an arm to a pose in the world."""
-        arm = self.arm(name)
-        X = from_noap(pose)
-        self._changing(arm, "tool", now)
-        arm.move_tool(X, leaping=leaping)
+        arm, before = self.arm(name), self.arm(name).q
+        arm.move_tool(from_noap(pose), leaping=leaping)
+        self._changed(arm, before, "tool", now)
 
-    def jog(self, name: str, frame: str, axis: int, step: float, now: float) -> None:
-        """Move an arm by a part of its full jogging speed times a time.
+    def jog(  # noqa: PLR0917 - a jog depends on all of this
+        self, name: str, frame: str, axis: int, length: float, angle: float, now: float
+    ) -> None:
+        """Move an arm by a length or by an angle, as the axis is.
 
         Args:
             name: of the arm.
             frame: ``JOINT``, or whose axes are meant: ``BASE``, ``TOOL``, ``WORLD`` or a frame.
             axis: from 0: a joint; or x, y, z, then the rotations about them, through the tool.
-            step: share of the full speed times time [s], with its sign.
+            length: along an axis, or of a sliding joint, with its sign [m].
+            angle: about an axis, or of a revolute joint, with its sign [rad].
             now: the time [s].
+
+        Raises:
+            UnreachableError: there is no such axis, the step is too long, or the arm cannot go there.
         """
+        if abs(length) > _LONGEST_STEP[0] or abs(angle) > _LONGEST_STEP[1]:
+            raise UnreachableError("a step is at most 100 mm or 30 deg")
         arm = self.arm(name)
         if frame == "JOINT":
             if not 0 <= axis < len(arm.q):
                 raise UnreachableError(f"{name} has {len(arm.q)} joints, got number {axis + 1}")
             revolute = arm.placed.arm.joints[axis].revolute
-            value = arm.q[axis] + step * (_TURNING if revolute else _SLIDING)
-            if not arm.lower[axis] <= value <= arm.upper[axis] and np.isclose(
-                arm.q[axis], np.clip(value, arm.lower[axis], arm.upper[axis])
-            ):
+            value = arm.q[axis] + (angle if revolute else length)
+            within = float(np.clip(value, arm.lower[axis], arm.upper[axis]))
+            if within != value and np.isclose(arm.q[axis], within):
                 raise UnreachableError(f"joint {axis + 1} is at its limit")
-            self.set_joint(name, axis + 1, float(value), now)
+            self.set_joint(name, axis + 1, within, now)
             return
         if not 0 <= axis < 6:
             raise UnreachableError(f"axes are numbered from 0 to 5, got {axis}")
-        X, along = arm.tool, self._axes(arm, frame)[:, axis % 3]
-        self._changing(arm, f"jog {frame} {axis}", now)
+        X, along, before = arm.tool, self._axes(arm, frame)[:, axis % 3], arm.q
         if axis < 3:
-            X = homogeneous(X[:3, :3], X[:3, 3] + step * _SLIDING * along)
+            X = homogeneous(X[:3, :3], X[:3, 3] + length * along)
         else:
-            X = homogeneous(rotation_from_vector(step * _TURNING * along) @ X[:3, :3], X[:3, 3])
+            X = homogeneous(rotation_from_vector(angle * along) @ X[:3, :3], X[:3, 3])
         arm.move_tool(X)
+        self._changed(arm, before, f"jog {frame} {axis}", now)
 
     def _axes(self, arm: LiveArm, frame: str) -> Array:
         """Return the axes (3, 3) of a frame, in its columns."""
@@ -156,9 +165,9 @@ class Workbench:
 
     def go_to(self, name: str, goal: str, now: float) -> None:
         """Bring the tool of an arm to a frame, or the arm to a joint target."""
-        arm, q = self.arm(name), self._configuration_at(name, goal)
-        self._changing(arm, f"go to {goal}", now)
+        arm, q, before = self.arm(name), self._configuration_at(name, goal), self.arm(name).q
         arm.set_joints(q)
+        self._changed(arm, before, f"go to {goal}", now)
 
     def _configuration_at(self, name: str, goal: str) -> Array:
         """Return the configuration (n,) in which an arm is at a frame or a joint target.
@@ -184,8 +193,9 @@ class Workbench:
             raise UnreachableError(f"there are solutions 0 to {len(solutions) - 1}, got {number}")
         if solutions[number].fault:
             raise UnreachableError(solutions[number].fault)
-        self._changing(arm, "solution", now)
+        before = arm.q
         arm.set_joints(solutions[number].q)
+        self._changed(arm, before, "solution", now)
 
     def grip(self, name: str, *, open_it: bool, now: float) -> None:
         """Open or close the gripper of an arm; it takes the part that is between its fingers."""
@@ -195,11 +205,13 @@ class Workbench:
         self._checks = None
         self._changes += 1
 
-    def _changing(self, arm: LiveArm, gesture: str, now: float) -> None:
-        """Keep where an arm is, to return to it, unless it is still moved by the same gesture."""
+    def _changed(self, arm: LiveArm, before: Array, gesture: str, now: float) -> None:
+        """Keep where an arm was, to return to it, unless it is still moved by the same gesture, or has not moved."""
         what, latest = self._gesture
+        if np.array_equal(arm.q, before):
+            return
         if what != f"{arm.name} {gesture}" or now - latest > _ONE_GESTURE:
-            self._undo = [*self._undo, (arm.name, arm.q)][-_MOST_UNDONE:]
+            self._undo = [*self._undo, (arm.name, before)][-_MOST_UNDONE:]
         self._gesture = f"{arm.name} {gesture}", now
 
     def undo(self) -> None:
@@ -219,7 +231,7 @@ class Workbench:
             self._tree, self._spelled = tree, run.spelled
             self._changes += 1
         widths = {name: arm.gripper_or_usual.opening for name, arm in self.cell.arms.items()}
-        openings = {name: run.opening(name) * width for name, width in widths.items()}
+        openings = {name: run.happened.openings.get(name, 1.0) * width for name, width in widths.items()}
         key = tuple((carrier, X.tobytes()) for carrier, X in parts.values()), tuple(openings.values())
         if key != self._followed:
             self._followed, self._checks = key, None
@@ -263,11 +275,11 @@ class Workbench:
         self.map_number += 1
 
     def map_on(self) -> bool:
-        """Work out some more of the map; return whether all of it has become known."""
+        """Work out some more of the map; return whether there was more."""
         if self.map is None or self.map.done:
             return False
         self.map.step()
-        return self.map.done
+        return True
 
     def preview(self, name: str, goal: str) -> None:
         """Show where an arm would be at a frame or a joint target; without a name, show that no more."""

@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 import attrs
 
 from armwright.files.result_table import ResultTable
-from armwright.report.figures import bar_chart
+from armwright.report.elements import Tile
+from armwright.report.figures import Drawing, bar_chart
 from armwright.study.dh_calibration import NOISE, PRINTED_POINTS, ParameterRow, Row, parameter_table, verification_table
 
 
@@ -23,6 +24,7 @@ class DhCalibration:
     verification: list[Row]
     parameters: list[ParameterRow]
 
+    title: ClassVar[str] = "calibration of a three-joint arm (thesis, section 2.3)"
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -51,7 +53,18 @@ class DhCalibration:
             rows=map(_parameter, self.parameters),
         )
 
-    def figures(self) -> dict[str, str | bytes]:
+    def headline(self) -> Iterator[Tile]:
+        """Give the mean error of the nominal arm, of the thesis' best fit, and of the complete model."""
+        nominal, *fits = self.verification
+        yield Tile(f"{nominal.mean:.1f} mm", "mean error at six points, nominal arm (simulated)")
+        for model in ("thesis", "complete"):
+            best = min((row for row in fits if row.model == model), key=lambda row: row.mean)
+            name = "the thesis' fit" if model == "thesis" else "the complete model"
+            yield Tile(f"{best.mean:.3g} mm", f"with {name}, {best.points}")
+        printed = min(sum(row.printed) / len(row.printed) for row in fits if row.printed)
+        yield Tile(f"{printed:.1f} mm", "printed: best fit of the thesis, on its own arm")
+
+    def figures(self) -> list[Drawing]:
         """Return a picture of the errors at the verification points."""
         names = [f"{x}, {y}, {z}" for x, y, z in PRINTED_POINTS]
         values = {
@@ -60,7 +73,8 @@ class DhCalibration:
             if row.points in ("none", "flat", "all three")
         }
         title = "Errors at the verification points: nominal arm, the thesis' fit, the complete model"
-        return {"verification.svg": bar_chart(title, names, values, y_label="error, mm", logarithmic=True)}
+        svg = bar_chart(title, names, values, y_label="error, mm", logarithmic=True)
+        return [Drawing("verification", title, svg)]
 
 
 def _verification(row: Row, nominal: Row) -> Iterator[tuple[str, ...]]:

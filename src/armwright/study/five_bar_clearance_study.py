@@ -7,6 +7,8 @@ import attrs
 
 from armwright.clearance.correction import Correction
 from armwright.files.result_table import ResultTable
+from armwright.report.elements import Tile
+from armwright.report.figures import Drawing
 from armwright.study import five_bar_clearance as study
 from armwright.study.five_bar_figures import figures
 
@@ -33,6 +35,7 @@ class FiveBarClearance:
     corrected: Correction
     corrections: list[study.TargetRow]
 
+    title: ClassVar[str] = "a parallel arm with clearance in three joints (thesis, tables 5.3 to 5.12)"
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -102,8 +105,22 @@ class FiveBarClearance:
             rows=[(node, *_fixed((*printed, *ours), 3)) for node, printed, ours in nodes],
         )
 
-    def figures(self) -> dict[str, str | bytes]:
-        """Return the thesis' figures by the name of their file."""
+    def headline(self) -> Iterator[Tile]:
+        """Give the accuracy of the clearances estimated best, and the errors of arm A before and after a correction."""
+        own = [row for row in self.estimates if row.arm == "A"]
+        best = max(own, key=lambda row: row.mean)
+        printed = max(row.printed_mean for row in own if row.printed_mean is not None)
+        yield Tile(
+            f"{best.mean:.2f} %", f"accuracy of the clearances of arm A, by {_method(best)}; printed {printed:.2f} %"
+        )
+        for row in self.corrections[:2]:
+            mean = sum(row.ours) / len(row.ours)
+            was = f"; printed {sum(row.printed) / len(row.printed):.3f} mm" if row.printed else ""
+            yield Tile(f"{mean:.4f} mm", f"mean error of arm A at the targets, {row.case}{was}")
+        yield Tile(str(len(self.swept.points)), "linkages simulated on three paths")
+
+    def figures(self) -> list[Drawing]:
+        """Return the thesis' figures."""
         return figures(self.swept, self.corrected)
 
 
@@ -111,8 +128,12 @@ def _fixed(values: Iterable[float], digits: int) -> Iterator[str]:
     return (f"{x:.{digits}f}" for x in values)
 
 
+def _method(row: study.EstimateRow) -> str:
+    return "amplitude" if row.method == "amp_dc" else row.method
+
+
 def _estimate(row: study.EstimateRow) -> Iterator[tuple[str, ...]]:
-    names = row.arm, "amplitude" if row.method == "amp_dc" else row.method
+    names = row.arm, _method(row)
     if row.printed is not None:
         yield *names, "printed", *_fixed(row.printed, 3), f"{row.printed_mean:.2f} %"
         names = "", ""

@@ -8,6 +8,8 @@ import attrs
 
 from armwright.arm.load import load_arm
 from armwright.files.result_table import ResultTable
+from armwright.report.elements import Tile
+from armwright.report.figures import Drawing, Film
 from armwright.report.move_figures import overview, panels, path_figure
 from armwright.report.movie import render_films
 from armwright.study import puma_moves
@@ -29,6 +31,7 @@ class PumaMoves:
     moves: list[puma_moves.MoveRow]
     detours: list[puma_moves.DetourRow]
 
+    title: ClassVar[str] = "a joint move and a Cartesian move of the PUMA (figures 5 to 25 of the project)"
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -81,24 +84,41 @@ class PumaMoves:
             rows=[(row.method, "yes" if row.exists else "no", row.summary) for row in self.detours],
         )
 
-    def figures(self) -> dict[str, str | bytes]:
-        """Return the project's figures by the name of their file, the last one as a film."""
+    def headline(self) -> Iterator[Tile]:
+        """Give by how much each move must run slower, and how many Cartesian moves are stopped."""
+        for row in self.moves:
+            yield Tile(
+                f"{row.slower:.1f} x", f"slower within the limits: {row.name}", mark="warn" if row.slower > 1 else ""
+            )
+        stopped = sum(bool(row.stopped) for row in self.moves)
+        yield Tile(f"{stopped} of {len(self.moves)}", "moves meet a stop of a joint", mark="bad" if stopped else "")
+
+    def figures(self) -> list[Drawing | Film]:
+        """Return the project's figures, the last one as a film."""
         t = puma_moves.sample_times()
         positions = dict(zip(puma_moves.NAMES, puma_moves.study_poses()[:, :3, 3], strict=True))
         pose_times = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
-        files: dict[str, str | bytes] = {}
+        drawn: dict[int, Drawing | Film] = {}
         curves = {number: puma_moves.figure_panels(number) for number in puma_moves.CURVES}
         for number, (kind, _) in puma_moves.CURVES.items():
-            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, curves[number], marks=pose_times)
+            title = f"Figure {number}: {_title(kind)}"
+            caption = f"{title}, {', '.join(dict.fromkeys(panel.title for panel in curves[number]))}"
+            drawn[number] = Drawing(_name(number), caption, panels(title, t, curves[number], marks=pose_times))
         for number, kind in puma_moves.PATHS.items():
             title = f"Figure {number}: {_title(kind)}, path and approach vectors"
-            files[_name(number)] = path_figure(title, puma_moves.poses_along(kind, t), positions)
+            svg = path_figure(title, puma_moves.poses_along(kind, t), positions)
+            drawn[number] = Drawing(_name(number), title, svg)
         for number, kind in puma_moves.OVERVIEWS.items():
             three = [curves[shown][0] for shown, (moved, _) in puma_moves.CURVES.items() if moved == kind]
             X = puma_moves.poses_along(kind, t)
-            files[_name(number)] = overview(f"Figure {number}: {_title(kind)}", t, three, X, positions)
+            title = f"Figure {number}: {_title(kind)}"
+            svg = overview(title, t, three, X, positions)
+            drawn[number] = Drawing(_name(number), f"{title}, everything together", svg)
         move = render_films(load_arm("puma560-seed"), puma_moves.joint_trajectory(), puma_moves.study_poses())
-        return {**files, **{name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in move.items()}}
+        name = _name(puma_moves.FILM)
+        files = {film.replace("move", name): data for film, data in move.items()}
+        drawn[puma_moves.FILM] = Film(name, f"Figure {puma_moves.FILM}: {_title('joint')}, as a film", files)
+        return [drawn[number] for number in sorted(drawn)]
 
 
 def _move(row: puma_moves.MoveRow) -> tuple[str, ...]:
@@ -115,7 +135,7 @@ def _move(row: puma_moves.MoveRow) -> tuple[str, ...]:
 
 
 def _name(number: int) -> str:
-    return f"figure{number:02d}.svg"
+    return f"figure{number:02d}"
 
 
 def _title(kind: puma_moves.MoveKind) -> str:

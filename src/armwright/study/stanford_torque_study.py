@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 import attrs
 
 from armwright.files.result_table import ResultTable
-from armwright.report.figures import curves
+from armwright.report.elements import Tile
+from armwright.report.figures import Drawing, curves
 from armwright.study import stanford_torque as study
 
 
@@ -28,6 +29,7 @@ class StanfordTorque:
     efforts: study.Torques
     joints: list[study.JointRow]
 
+    title: ClassVar[str] = "efforts of the Stanford arm (TR-83-008, figures 3 to 11)"
     notes: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
@@ -71,11 +73,26 @@ class StanfordTorque:
             ],
         )
 
-    def figures(self) -> dict[str, str | bytes]:
-        """Return figures 3 to 11 by the name of their file."""
-        files: dict[str, str | bytes] = {}
+    def headline(self) -> Iterator[Tile]:
+        """Give how many printed constants agree, and the largest errors of the simpler models."""
+        printed = [*self.constants, *self.load]
+        agreeing = sum(row.verdict == "agrees" for row in printed)
+        yield Tile(f"{agreeing} of {len(printed)}", "printed constants agree")
+        wrong = sum(row.verdict == "wrong" for row in printed)
+        yield Tile(str(wrong), "printed constants are wrong", mark="warn" if wrong else "")
+        worst = max(self.joints, key=lambda row: row.bejczy)
+        yield Tile(f"{worst.bejczy * 100:.0f} %", f"largest error of Bejczy's model, joint {worst.joint}")
+        loaded = max(self.joints, key=lambda row: row.peak_loaded / row.limit)
+        share = loaded.peak_loaded / loaded.limit
+        label = f"of what its motor gives, joint {loaded.joint} with the largest load"
+        yield Tile(f"{share * 100:.0f} %", label, mark="bad" if share > 1 else "")
+
+    def figures(self) -> list[Drawing]:
+        """Return figures 3 to 11."""
+        drawn = []
         for number in range(3, 12):
             panel = study.figure(self.efforts, number)
             title, t = f"Figure {number}: {panel.title}", self.efforts.t
-            files[f"figure{number:02d}.svg"] = curves(title, t, panel.lines, x_label="time, s", y_label=panel.unit)
-        return files
+            svg = curves(title, t, panel.lines, x_label="time, s", y_label=panel.unit)
+            drawn.append(Drawing(f"figure{number:02d}", title, svg))
+        return drawn

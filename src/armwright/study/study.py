@@ -1,11 +1,13 @@
 """The experiments of the sources behind a protocol, by name."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from typing import Protocol
 
 from armwright.errors import one_of
 from armwright.files.result_table import Result
+from armwright.report.elements import Tile
+from armwright.report.figures import Drawing, Film
 
 Progress = Callable[[str, float], None]
 
@@ -16,8 +18,15 @@ class Study(Result, Protocol):
     A module of this folder has a class for each experiment, whose ``run`` runs it.
     """
 
-    def figures(self) -> dict[str, str | bytes]:
-        """Return the figures by the name of their file."""
+    @property
+    def title(self) -> str:
+        """What is repeated, and of which source."""
+
+    def headline(self) -> Iterator[Tile]:
+        """Give the numbers that a reader looks for first."""
+
+    def figures(self) -> Sequence[Drawing | Film]:
+        """Return the figures in the order of the source."""
 
 
 # Module and class of each study, by name.

@@ -32,6 +32,8 @@ from armwright.program.vm.recording import Effect
 # To the next stop; to the next statement, over calls, into them, out of them; to the next stage of a MOVE; to the next
 # servo tick; back to the statement before, the tick before, the breakpoint before.
 Command: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back", "tick back", "reverse"]
+# A time this part of a tick before one is on it.
+_ON_A_TICK = 1e-6
 _BACKWARD_COMMANDS = frozenset(("back", "tick back", "reverse"))
 
 
@@ -111,6 +113,17 @@ class Debugger:
                 self._active = execution.step_back_tick(path)
             case "reverse":
                 self._active = execution.reverse_to_breakpoint()
+
+    def rewind(self, time: float) -> None:
+        """Let the run go back to a time [s] that it has been at, or a tick before; ``run_slice`` does it.
+
+        Raises:
+            DebuggerError: the run does not stand still.
+        """
+        self._require_stopped()
+        self._origin = self.execution.position
+        tick = math.floor(time / self.machine.cell.period + _ON_A_TICK)
+        self._active = self.execution.go_to_tick(tick)
 
     def run_slice(self, seconds: float = math.inf) -> Stop | None:
         """Do what the run has to do up to the next stop.

@@ -286,9 +286,12 @@ class Execution:
 
     def step_back_tick(self, path: ProcessPath) -> RunToStop:
         """Go back to the servo tick before, as it was when the time had come to it."""
-        tick = self.tick - 1
-        if tick < 0:
+        if self.tick < 1:
             return self._stop_at((0, 0), Stop(reason="start"))
+        return (yield from self.go_to_tick(self.tick - 1, Stop(reason="step", path=path)))
+
+    def go_to_tick(self, tick: int, stop: Stop | None = None) -> RunToStop:
+        """Go back to a servo tick, as it was when the time had come to it; give the stop there, a pause by default."""
         limit = self.timeline.step_count
         for step_count in self.timeline.snapshots_before(limit + 1):
             self.timeline.seek(step_count)
@@ -301,7 +304,8 @@ class Execution:
         ):
             self.timeline.advance()
             yield
-        return self._stop_at((self.timeline.step_count, tick), Stop(reason="step", path=path), passed=False)
+        stop = stop or Stop(reason="pause", path=self.next_process)
+        return self._stop_at((self.timeline.step_count, tick), stop, passed=False)
 
     def reverse_to_breakpoint(self) -> RunToStop:
         """Go back to the last moment at which a breakpoint stops the run, or else to the start."""

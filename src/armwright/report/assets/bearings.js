@@ -1,7 +1,9 @@
 // The bearings: every journal in its hole, the gap so large that one sees it.
 
-// The journal's radius as part of the wall's; the rest is left for the gap.
+// The journal's radius as part of the wall's; the rest is left for the gap. Around the wall is room for ring and arrow
+// [pixels], on a drawing of this size; on smaller ones less.
 const JOURNAL = 0.45;
+const [ROOM, RING, SIZE] = [34, 9, 260];
 const most = Math.max(2, ...data.pins.map((pin) => pin.peak_N));
 const bearings = [];
 
@@ -28,9 +30,10 @@ function readForceColours() {
 }
 
 function hole(size) {
-  const wall = size / 2 - 34;
+  const part = Math.min(1, size / SIZE);
+  const wall = size / 2 - ROOM * part;
   const journal = JOURNAL * wall;
-  return { wall, journal, room: wall - journal, middle: [size / 2, size / 2] };
+  return { part, wall, journal, room: wall - journal, middle: [size / 2, size / 2] };
 }
 
 function drawWay(pin, i, { room, middle }, last) {
@@ -43,16 +46,17 @@ function drawWay(pin, i, { room, middle }, last) {
   polyline(places.slice(0, last + 1), colours.hues[i % HUES], 1.5);
 }
 
-function drawArrow([x, y], [dx, dy], length, colour) {
+function drawArrow([x, y], [dx, dy], length, colour, part) {
   const tip = [x + dx * length, y + dy * length];
-  polyline([[x, y], tip], colour, 3);
+  polyline([[x, y], tip], colour, 3 * part);
+  const [back, aside, fore] = [7 * part, 4.5 * part, 3 * part];
   const head = [-1, 1].map((side) => [
-    tip[0] - 7 * dx + 4.5 * side * dy,
-    tip[1] - 7 * dy - 4.5 * side * dx,
+    tip[0] - back * dx + aside * side * dy,
+    tip[1] - back * dy - aside * side * dx,
   ]);
   pen.fillStyle = colour;
   pen.beginPath();
-  for (const [px, py] of [[tip[0] + 3 * dx, tip[1] + 3 * dy], ...head]) pen.lineTo(px, py);
+  for (const [px, py] of [[tip[0] + fore * dx, tip[1] + fore * dy], ...head]) pen.lineTo(px, py);
   pen.fill();
 }
 
@@ -61,10 +65,10 @@ function drawBearing({ pin, view }, i, place) {
   if (!size) return;
   pen = ink;
   const shape = hole(size);
-  const { wall, journal, room, middle } = shape;
+  const { part, wall, journal, room, middle } = shape;
   const gap = blend(data.gaps_um, place).slice(2 * i, 2 * i + 2);
   const [force, flies] = [forceAt(place, i), fliesAt(place, i)];
-  disc(middle, wall + 9, colours.metal);
+  disc(middle, wall + RING * part, colours.metal);
   disc(middle, wall, colours.sky, colours.ink, 1.5);
   const centre = [middle[0] + (room * gap[0]) / pin.clearance_um, middle[1] - (room * gap[1]) / pin.clearance_um];
   pen.globalAlpha = 0.4;
@@ -79,7 +83,8 @@ function drawBearing({ pin, view }, i, place) {
   const distance = Math.hypot(...gap);
   if (!flies && force > 0 && distance > 0) {
     const way = [gap[0] / distance, -gap[1] / distance];
-    drawArrow([middle[0] + wall * way[0], middle[1] + wall * way[1]], way, 5 + 19 * strength(force), forceColour(force));
+    const foot = [middle[0] + wall * way[0], middle[1] + wall * way[1]];
+    drawArrow(foot, way, (5 + 19 * strength(force)) * part, forceColour(force), part);
   }
 }
 
@@ -100,19 +105,21 @@ function drawBearings() {
 function startBearings() {
   readForceColours();
   byId("most").textContent = forceText(most);
+  byId("bearings").style.setProperty("--count", data.pins.length);
   for (const pin of data.pins) {
     const view = make("canvas");
     view.setAttribute("role", "img");
     view.setAttribute("aria-label", `Journal ${pin.name} in its bearing`);
-    const said = make("span");
-    const play = make("span", { className: "quiet", textContent: `${number(pin.clearance_um, 0)} µm` });
+    const said = make("span", { className: "now" });
+    const play = make("span", { className: "quiet", textContent: `play ${number(pin.clearance_um, 0)} µm` });
+    const peak = make("span", { className: "quiet", textContent: `largest force ${pin.peak_N === null ? "∞" : forceText(pin.peak_N)}` });
     bearings.push({ pin, view, said });
     byId("bearings").append(
       make(
         "figure",
         { className: "bearing" },
         view,
-        make("figcaption", {}, make("b", { textContent: pin.name }), said, play),
+        make("figcaption", {}, make("b", { textContent: pin.name }), said, play, peak),
       ),
     );
   }

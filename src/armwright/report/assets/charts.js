@@ -88,28 +88,18 @@ function drawScales(ink, axes, unit) {
   }
 }
 
-// A line with gaps where there is nothing; on a scale of powers it comes from the foot and goes back there, so that a
-// single value is seen.
+// A line with gaps where there is nothing.
 function drawLine(ink, axes, { times, values, colour, dash = [], width = axes.powers ? 1.2 : 1.5, alpha = 1 }) {
-  const foot = axes.y0 + axes.h;
   ink.setLineDash(dash);
   ink.strokeStyle = colour;
   ink.lineWidth = width;
   ink.globalAlpha = alpha;
   ink.lineJoin = "round";
   ink.beginPath();
-  let last = null;
+  let drawn = false;
   values.forEach((value, i) => {
-    if (value === null) {
-      if (last !== null && axes.powers) ink.lineTo(last, foot);
-      last = null;
-      return;
-    }
-    const [x, y] = [axes.x(times[i]), axes.y(value)];
-    if (last === null && axes.powers && i) ink.moveTo(x, foot);
-    if (last === null && !(axes.powers && i)) ink.moveTo(x, y);
-    else ink.lineTo(x, y);
-    last = x;
+    if (value !== null) ink[drawn ? "lineTo" : "moveTo"](axes.x(times[i]), axes.y(value));
+    drawn = value !== null;
   });
   ink.stroke();
   ink.globalAlpha = 1;

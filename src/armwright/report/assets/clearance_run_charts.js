@@ -3,16 +3,17 @@
 // Height of the band of a pin [pixels].
 const BAND = 5;
 
+// A contact shorter than this part of the run is a point at its largest force: so short ones would be a hatching.
+const SHORT = 1 / 160;
+const POINT = 1.7;
+
 const column = (rows, i, factor = 1) => rows.map((row) => (row[i] === null ? null : row[i] * factor));
 
 function chartsOf() {
   const [x, y] = [0, 1].map((i) => column(data.error_um, i, 1e-3));
   const far = x.map((value, i) => (value === null ? null : Math.hypot(value, y[i])));
-  const forces = data.pins.map((pin, i) => ({
-    name: pin.name,
-    // What flies carries nothing, and has no place on a scale of powers of ten.
-    values: column(data.forces_N, i).map((force) => (force > 0 ? force : null)),
-  }));
+  // What flies carries nothing, and has no place on a scale of powers of ten.
+  const forces = data.pins.map((pin, i) => contacts(pin.name, column(data.forces_N, i).map((force) => (force > 0 ? force : null))));
   const energy = [0, 1, 2, 3, 4, 5].map((i) => column(data.energy_J, i));
   const from = (values) => values.map((value) => (value === null ? null : value - values[0]));
   return [
@@ -22,8 +23,8 @@ function chartsOf() {
       digits: 3,
       curves: [
         { name: "E", values: far },
-        { name: "x", values: x },
-        { name: "y", values: y },
+        { name: "x →", values: x },
+        { name: "y ↑", values: y },
       ],
     },
     { title: "Contact forces", unit: "N", digits: 1, curves: forces, powers: true, bands: true },
@@ -44,10 +45,27 @@ function chartsOf() {
       curves: [
         { name: "impacts", values: energy[3] },
         { name: "friction", values: energy[4] },
-        { name: "not explained", values: energy[5] },
+        { name: "residual of the balance", values: energy[5] },
       ],
     },
   ];
+}
+
+// The forces of a pin: all of them, those of long contacts, and the time and largest force of each short one.
+function contacts(name, values) {
+  const long = [...values];
+  const points = [];
+  let from = 0;
+  for (let i = 0; i <= values.length; i++) {
+    if (i < values.length && values[i] !== null) continue;
+    if (i > from && data.t[i - 1] - data.t[from] < SHORT * data.duration) {
+      const peak = values.slice(from, i).reduce((best, force, k) => (force > values[best] ? from + k : best), from);
+      points.push([data.t[peak], values[peak]]);
+      long.fill(null, from, i);
+    }
+    from = i + 1;
+  }
+  return { name, values, long, points };
 }
 
 function spanOf(curves, powers) {
@@ -65,8 +83,16 @@ function spanOf(curves, powers) {
   return [low < 0 ? low - pad : 0, high + pad];
 }
 
-// Below the forces a band for each pin: full where it touches, empty where it flies.
-function drawBands(ink, axes) {
+// Short contacts, and below the forces a band for each pin: full where it touches, empty where it flies.
+function drawContacts(ink, axes, curves) {
+  curves.forEach(({ points }, i) => {
+    ink.fillStyle = colours.hues[i % HUES];
+    for (const [t, force] of points) {
+      ink.beginPath();
+      ink.arc(axes.x(t), axes.y(force), POINT, 0, 2 * Math.PI);
+      ink.fill();
+    }
+  });
   data.pins.forEach((_, i) => {
     const y = axes.y0 + axes.h + 4 + BAND * i;
     ink.fillStyle = colours.hues[i % HUES];
@@ -112,8 +138,8 @@ function clearanceChart(said) {
     span: () => span,
     powers,
     below: bands ? BAND * curves.length + 4 : 0,
-    paint: bands ? drawBands : null,
-    lines: () => curves.map(({ values }, i) => ({ times: data.t, values, colour: colours.hues[i % HUES] })),
+    paint: bands ? (ink, axes) => drawContacts(ink, axes, curves) : null,
+    lines: () => curves.map(({ values, long = values }, i) => ({ times: data.t, values: long, colour: colours.hues[i % HUES] })),
     tipAt: (t) => saidAt(t, said),
   };
 }

@@ -55,7 +55,6 @@ function showCompletions() {
   const { items, chosen } = helping;
   const field = byId("text");
   list.hidden = !items.length;
-  field.setAttribute("aria-expanded", String(Boolean(items.length)));
   if (!items.length) {
     field.removeAttribute("aria-activedescendant");
     return;
@@ -72,11 +71,13 @@ function showCompletions() {
     }),
   );
   field.setAttribute("aria-activedescendant", `completion-${chosen}`);
+  const box = byId("code").getBoundingClientRect();
   const [x, y] = placeOf(helping.place);
-  const room = byId("code").clientHeight - y;
-  Object.assign(list.style, { left: `${Math.max(0, Math.min(x, byId("code").clientWidth - 240))}px` });
-  if (room < 120 && y > room) Object.assign(list.style, { top: "auto", bottom: `${byId("code").clientHeight - y + 22}px` });
-  else Object.assign(list.style, { top: `${y + 2}px`, bottom: "auto" });
+  list.style.left = `${Math.max(4, Math.min(box.left + x, innerWidth - 350))}px`;
+  // Below the line that is written, or above it.
+  const below = box.top + y + 2;
+  const above = below + list.offsetHeight > innerHeight;
+  list.style.top = `${above ? Math.max(4, below - list.offsetHeight - 24) : below}px`;
   list.children[chosen].scrollIntoView({ block: "nearest" });
 }
 

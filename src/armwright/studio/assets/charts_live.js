@@ -7,7 +7,8 @@ function takeMotion(run) {
   const motion = run?.motions[chosenArm().name];
   if (!motion) return;
   const last = strip.rows.at(-1);
-  if (strip.arm !== now.arm || (last && run.time < last.t)) strip.rows = [];
+  if (strip.arm !== now.arm) strip.rows = [];
+  if (last && run.time < last.t) strip.rows = strip.rows.filter(({ t }) => t < run.time);
   strip.arm = now.arm;
   if (strip.rows.at(-1)?.t !== run.time) strip.rows.push({ t: run.time, ...motion });
   while (strip.rows.length && strip.rows[0].t < run.time - KEPT) strip.rows.shift();
@@ -47,7 +48,8 @@ function paintStrip() {
     pen.stroke();
   }
   pen.setLineDash([]);
-  for (const [key, alpha, wide] of [[quantity.key, 0.45, 3], [measured, 1, 1.3]]) {
+  const both = valuesOf(measured).length > 0 && valuesOf(quantity.key).length > 0;
+  for (const [key, alpha, wide] of [[quantity.key, both ? 0.45 : 1, both ? 3 : 1.6], [measured, 1, 1.3]]) {
     const known = valuesOf(key);
     joints.forEach((_, j) => {
       pen.strokeStyle = colours.hues[j % HUES];
@@ -59,6 +61,11 @@ function paintStrip() {
     });
   }
   pen.globalAlpha = 1;
+  pen.fillStyle = colours.quiet;
+  pen.textAlign = "end";
+  pen.fillText(`${number(to, 1)} s`, width - 8, height - 2);
+  pen.textAlign = "start";
+  pen.fillText(`${number(from, 1)} s, ${chosenArm().name}`, 42, height - 2);
   byId("strip-legend").replaceChildren(
     ...joints.map((joint, j) => {
       const swatch = make("i", { className: "swatch" });

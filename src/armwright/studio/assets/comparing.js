@@ -3,7 +3,7 @@
 const comparing = { motions: [] };
 const FIGURES = [
   ["duration", "takes", (value) => `${number(value, 2)} s`],
-  ["way", "way of the tool", (value) => `${number(value * MILLIMETRES, 0)} mm`],
+  ["path_length", "path of the tool", (value) => `${number(value * MILLIMETRES, 0)} mm`],
   ["tool_speed", "fastest", (value) => `${number(value * MILLIMETRES, 0)} mm/s`],
   ["speed_share", "speed of joints", (value, it) => `${number(100 * value, 0)} %, J${it.speed_joint}`],
   ["acceleration_share", "acceleration", (value, it) => `${number(100 * value, 0)} %, J${it.acceleration_joint}`],
@@ -21,7 +21,8 @@ function showComparison() {
   const head = make("tr", {}, make("th"), ...motions.map((motion, k) => make("th", { scope: "col", className: `motion-${k}` }, make("span", { title: motion.name, textContent: `${k ? "B" : "A"}: ${motion.name}` }))), motions.length > 1 ? make("th", { scope: "col", textContent: "B to A" }) : "");
   const rows = FIGURES.map(([key, title, text]) => {
     const values = motions.map((motion) => (key === "duration" ? motion.duration : motion.figures[key]));
-    const change = values.length > 1 && values[0] ? `${number(100 * (values[1] / values[0] - 1), 1)} %` : "";
+    const percent = values.length > 1 && values[0] ? 100 * (values[1] / values[0] - 1) : null;
+    const change = percent === null ? "" : `${percent > 0 ? "+" : ""}${number(percent, 1)} %`;
     return make("tr", {}, make("th", { scope: "row", textContent: title }), ...values.map((value, k) => make("td", { textContent: value === null ? "" : text(value, motions[k].figures) })), motions.length > 1 ? make("td", { textContent: change }) : "");
   });
   byId("compare-figures").replaceChildren(make("thead", {}, head), make("tbody", {}, ...rows));

@@ -53,9 +53,14 @@ function fillGutter(lines) {
     const line = gutter.children.length + 1;
     const button = make("button", { type: "button", textContent: line, ariaLabel: `Breakpoint in line ${line}`, tabIndex: -1 });
     button.ariaPressed = "false";
-    button.addEventListener("click", () => send({ do: "break", line, on: button.ariaPressed !== "true" }));
+    button.addEventListener("click", () => toggleBreakpoint(line));
     gutter.append(button);
   }
+}
+
+function toggleBreakpoint(line) {
+  const button = byId("gutter").children[line - 1];
+  send({ do: "break", line, on: button?.ariaPressed !== "true" });
 }
 
 function sendText() {
@@ -78,9 +83,12 @@ function showEditor(state) {
     editor.version = program.version;
   }
   if (program.version === editor.version && !editor.timer) editor.problems = program.diagnostics;
-  byId("program-name").textContent = program.name + (program.changed ? ", not saved" : "");
+  byId("program-name").textContent = program.name + (program.changed ? " *" : "");
+  byId("program-name").title = program.changed ? "not saved" : "saved";
+  byId("reload").hidden = !program.named || !program.changed;
+  byId("reload").disabled = !mine();
   byId("save-program").disabled = !mine() || !program.changed;
-  byId("text").readOnly = Boolean(run) || !mine();
+  byId("text").readOnly = Boolean(run && !run.ended) || !mine();
   const breakpoints = new Set(program.breakpoints);
   const key = JSON.stringify([program.version, program.diagnostics, byId("text").value.length]);
   if (key !== editor.key) {
@@ -116,6 +124,7 @@ function showProblems(diagnostics) {
     ...diagnostics.map((it) => {
       const go = make("button", { type: "button", className: it.severity }, make("b", { textContent: `${it.code} line ${it.line}` }), ` ${it.text}`, ...it.helps.map((help) => make("small", { textContent: help })));
       go.addEventListener("click", () => {
+        if (!editor.problems.length) return;
         byId("text").focus();
         byId("text").setSelectionRange(it.start, it.end);
       });
@@ -131,6 +140,8 @@ function showProblems(diagnostics) {
 }
 
 function applyFixes(fixes) {
+  // What has been typed since has moved the places of the fixes.
+  if (!editor.problems.length) return;
   let text = byId("text").value;
   for (const fix of [...fixes].sort((a, b) => b.start - a.start)) text = text.slice(0, fix.start) + fix.text + text.slice(fix.end);
   byId("text").value = text;
@@ -160,9 +171,10 @@ function startEditor() {
     byId("colours").scrollLeft = field.scrollLeft;
   };
   field.addEventListener("scroll", follow);
+  byId("reload").addEventListener("click", () => send({ do: "reload" }));
   byId("save-program").addEventListener("click", () => {
     if (editor.timer) sendText();
-    send({ do: "save", what: "program" });
+    save("program");
   });
   paintText();
 }

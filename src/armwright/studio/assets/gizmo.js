@@ -113,7 +113,7 @@ function drag(x, y) {
 }
 
 // A program that runs moves the arms by itself.
-const canMove = () => mine() && !live.state.run;
+const canMove = () => mine() && (!live.state.run || live.state.run.ended);
 
 function paintGizmo() {
   const X = toolPose();

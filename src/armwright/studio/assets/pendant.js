@@ -16,6 +16,12 @@ function holdButton(text, label, message) {
     button.focus({ preventScroll: true });
     holding.button = button;
     button.classList.add("held");
+    const size = Number(byId("jog-step").value);
+    if (size) {
+      // One step for a press; a key that is held down makes no more.
+      send({ do: "jog", arm: chosenArm().name, share: 1, length: size / MILLIMETRES, angle: (size * Math.PI) / 180, ...message() });
+      return;
+    }
     const go = () => send({ do: "jog", arm: chosenArm().name, share: jogShare(), ...message() }, "jog");
     go();
     holding.timer = setInterval(go, HELD_AGAIN);
@@ -55,17 +61,19 @@ function sliderRow(joint, j) {
   slider.addEventListener("input", () => set(Number(slider.value)));
   typed.addEventListener("change", () => {
     const value = Number(typed.value.replace("−", "-").replace(",", "."));
-    if (Number.isFinite(value) && typed.value.trim()) set(value / factor);
+    const asked = Number.isFinite(value) && typed.value.trim();
     typed.blur();
+    if (asked) set(value / factor);
+    else showPendant(live.state);
   });
-  const way = (sign) => () => ({ frame: "JOINT", axis: j, way: sign });
+  const along = (sign) => () => ({ frame: "JOINT", axis: j, sign });
   return make(
     "div",
     { className: "slider" },
     make("label", { htmlFor: id, textContent: `J${j + 1}`, title: `${quantityText(QUANTITIES[0], joint, low)} to ${quantityText(QUANTITIES[0], joint, high)}` }),
-    holdButton("−", `Joint ${j + 1} down`, way(-1)),
+    holdButton("−", `Joint ${j + 1} down`, along(-1)),
     slider,
-    holdButton("+", `Joint ${j + 1} up`, way(1)),
+    holdButton("+", `Joint ${j + 1} up`, along(1)),
     make("span", { className: "value" }, typed, QUANTITIES[0].units[joint.kind]),
   );
 }
@@ -76,7 +84,7 @@ function fillFrames() {
   const names = ["TOOL", "BASE", "WORLD", ...data.animation.frames.map(({ name }) => name)];
   const before = names.includes(frames.value) ? frames.value : "TOOL";
   frames.replaceChildren(
-    ...names.map((name, i) => make("option", { value: name, textContent: i < 3 ? name.toLowerCase() : name })),
+    ...names.map((name, i) => make("option", { value: name, textContent: i < 3 ? `${name.toLowerCase()} axes` : name })),
   );
   frames.value = before;
 }
@@ -89,10 +97,10 @@ function fillPendant() {
   byId("jog").replaceChildren(
     ...[1, -1].flatMap((sign) =>
       names.map((name, axis) =>
-        holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, `${axis < 3 ? "Move" : "Turn"} ${sign > 0 ? "up" : "down"} ${axis < 3 ? "along " : ""}${name}`, () => ({
+        holdButton(`${sign > 0 ? "+" : "−"}${name.replace("about ", "r")}`, axis < 3 ? `Move along ${sign > 0 ? "+" : "−"}${name}` : `Turn ${sign > 0 ? "+" : "−"} ${name}`, () => ({
           frame: frames.value,
           axis,
-          way: sign,
+          sign,
         })),
       ),
     ),
@@ -106,12 +114,14 @@ function showPendant(state) {
   [...byId("sliders").children].forEach((row, j) => {
     const [slider, typed] = [row.querySelector("input[type=range]"), row.querySelector("input[type=text]")];
     const joint = chosenArm().joints[j];
-    slider.value = it.q[j];
+    if (!slider.matches(":active")) slider.value = it.q[j];
     slider.setAttribute("aria-valuetext", quantityText(QUANTITIES[0], joint, it.q[j]));
     if (document.activeElement !== typed) typed.value = number(it.q[j] * unitFactor(QUANTITIES[0], joint), 2);
     row.classList.toggle("near", near.has(j + 1));
   });
-  byId("hand-text").textContent = it.tool ? `tool at ${placeText(it.tool.slice(9))} mm` : "";
+  [...byId("place").querySelectorAll("input")].forEach((field, k) => {
+    if (it.tool && document.activeElement !== field) field.value = number(it.tool[9 + k] * MILLIMETRES, 1).replace("−", "-");
+  });
   byId("grip-text").textContent = it.holds.length ? `holds ${it.holds.join(", ")}` : it.grip > 0.99 ? "open" : it.grip < 0.01 ? "closed" : `${number(100 * it.grip, 0)} % open`;
   showSolutions(it.solutions ?? []);
 }
@@ -149,7 +159,26 @@ function showSolutions(solutions) {
   });
 }
 
+// Where the tool is, to be read and to be typed.
+function fillPlace() {
+  byId("place").replaceChildren(
+    ...["x", "y", "z"].map((name, k) => {
+      const field = make("input", { type: "text", inputMode: "decimal", ariaLabel: `Tool ${name} in mm` });
+      field.addEventListener("change", () => {
+        const value = Number(field.value.replace("−", "-").replace(",", "."));
+        const pose = [...armState().tool];
+        pose[9 + k] = value / MILLIMETRES;
+        if (Number.isFinite(value) && field.value.trim()) send({ do: "tool", arm: chosenArm().name, pose, leaping: true });
+        field.blur();
+      });
+      return make("label", {}, name, " ", field);
+    }),
+    "mm",
+  );
+}
+
 function startPendant() {
+  fillPlace();
   fillPendant();
   const speed = () => {
     byId("share-text").textContent = `${number(100 * jogShare(), jogShare() < 0.1 ? 1 : 0)} %`;

@@ -6,40 +6,43 @@ function runMessage(extra = {}) {
 }
 
 function startRun() {
-  send(live.state.run ? { do: "go", way: "continue" } : runMessage());
+  send(live.state.run && !live.state.run.ended ? { do: "go", step: "continue" } : runMessage());
 }
 
-function step(way) {
+function goOn(way) {
   const process = byId("process").hidden || way === "back" ? "" : byId("process").value;
-  send(live.state.run ? { do: "go", way, process } : runMessage({ entry: true }));
+  send(live.state.run ? { do: "go", step: way, process } : runMessage({ entry: true }));
 }
 
 function showRun(state) {
   const { run, program } = state;
   const off = !mine();
-  byId("run").textContent = run ? "Go on" : "Run";
-  byId("run").disabled = off || (run ? run.ended || run.playing : !program.runs);
+  const under = run && !run.ended;
+  byId("run").textContent = under ? "Go on" : "Run";
+  byId("run").disabled = off || (under ? run.playing : !program.runs);
   byId("pause").disabled = off || !run?.playing;
   byId("step").disabled = off || Boolean(run?.ended) || (!run && !program.runs);
   byId("back").disabled = off || !run;
   byId("stop").disabled = off || !run;
-  byId("physics").disabled = off || Boolean(run);
+  byId("physics").disabled = off || Boolean(under);
+  for (const id of ["run-here", "run-line"]) byId(id).disabled = off || Boolean(under) || !program.runs;
+  byId("reset").disabled = off || Boolean(under);
   for (const button of document.querySelectorAll("[data-keep]")) button.disabled = off || !run;
   const texts = { end: "ended", failed: "failed", breakpoint: "stands at a breakpoint", entry: "stands at its beginning", step: "stands", start: "stands at its beginning", exception: "stands at an error", pause: "stands" };
   const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
-  byId("run-text").textContent = run ? `${number(run.time, 2)} s, ${what}${run.text ? `: ${run.text}` : ""}` : "";
+  byId("run-time").textContent = run ? `${number(run.time, 2)} s` : "";
+  const said = run ? `${what}${run.text ? `: ${run.text}` : ""}` : "";
+  if (byId("run-text").textContent !== said) byId("run-text").textContent = said;
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
   showProcesses(run);
-  showTrace(run?.trace ?? null);
+  // What happened in a run stays to be read when it has made way for something else.
+  if (state.trace !== undefined && run) showTrace(state.trace);
+  if (state.refusal) byId("export-text").textContent = "";
   showVariables(run?.variables ?? []);
 }
 
 function showTrace(trace) {
-  if (!trace) return;
   const list = byId("trace");
-  const key = `${trace.length} ${trace.at(-1)?.t}`;
-  if (list.dataset.key === key) return;
-  list.dataset.key = key;
   list.replaceChildren(
     ...trace.map(({ t, line, text }) => make("li", {}, make("time", { textContent: `${number(t, 2)} s` }), make("span", { className: "quiet", textContent: `line ${line}` }), make("span", { textContent: text }))),
   );
@@ -53,11 +56,21 @@ function saveBlob(blob, name) {
 }
 
 function keepFile({ name, type, data: content }) {
+  byId("export-text").textContent = "";
   saveBlob(new Blob([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], { type }), name);
 }
 
 // The view as a video, from one click to the next.
-const film = { recorder: null };
+const film = { recorder: null, canvas: null };
+
+// All layers of the view, on the ground of the page.
+function filmFrame() {
+  const { canvas: whole } = film;
+  const pen = whole.getContext("2d");
+  pen.fillStyle = getComputedStyle(canvas.parentElement).backgroundColor;
+  pen.fillRect(0, 0, whole.width, whole.height);
+  for (const layer of canvas.parentElement.querySelectorAll("canvas")) pen.drawImage(layer, 0, 0, whole.width, whole.height);
+}
 
 function toggleVideo() {
   const button = byId("video");
@@ -73,7 +86,9 @@ function toggleVideo() {
     return;
   }
   const pieces = [];
-  film.recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: type });
+  film.canvas = make("canvas", { width: canvas.width, height: canvas.height });
+  filmFrame();
+  film.recorder = new MediaRecorder(film.canvas.captureStream(30), { mimeType: type });
   film.recorder.ondataavailable = ({ data: piece }) => pieces.push(piece);
   film.recorder.onstop = () => saveBlob(new Blob(pieces, { type }), `view.${type.includes("mp4") ? "mp4" : "webm"}`);
   film.recorder.start();
@@ -104,18 +119,25 @@ function startRunning() {
   answers.download = keepFile;
   byId("video").addEventListener("click", toggleVideo);
   for (const button of document.querySelectorAll("[data-keep]"))
-    button.addEventListener("click", () => send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name }));
+    button.addEventListener("click", () => {
+      byId("export-text").textContent = "being made";
+      send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name });
+    });
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
-  byId("step").addEventListener("click", () => step(byId("step-way").value));
-  byId("back").addEventListener("click", () => send({ do: "go", way: "back" }));
+  byId("step").addEventListener("click", () => goOn(byId("step-way").value));
+  byId("back").addEventListener("click", () => send({ do: "go", step: "back" }));
   byId("stop").addEventListener("click", () => send({ do: "stop" }));
+  byId("run-here").addEventListener("click", () => send(runMessage({ line: editorLine() })));
+  byId("run-line").addEventListener("click", () => send(runMessage({ line: editorLine(), only: true })));
+  byId("reset").addEventListener("click", () => send({ do: "reset" }));
   byId("pace").addEventListener("change", (event) => {
     if (live.state.run) send({ do: "pace", rate: Number(event.target.value) });
   });
   document.addEventListener("keydown", (event) => {
     const typing = event.target.matches("textarea, input[type=text], input[type=number]");
-    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", way: "back" }) : step(byId("step-way").value)) };
+    const keys = { F5: () => (event.shiftKey ? send({ do: "stop" }) : startRun()), F10: () => (event.shiftKey ? send({ do: "go", step: "back" }) : goOn(byId("step-way").value)) };
+    if (event.key === "F9") keys.F9 = () => toggleBreakpoint(editorLine());
     if (event.key === " " && !typing && !event.target.matches("button, select, input") && live.state?.run?.playing) keys[" "] = () => send({ do: "pause" });
     if (!keys[event.key] || !mine()) return;
     event.preventDefault();
@@ -134,9 +156,9 @@ function startRunning() {
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => choose(tab));
     tab.addEventListener("keydown", (event) => {
-      const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!way) return;
-      const next = tabs[(i + way + tabs.length) % tabs.length];
+      const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (!by) return;
+      const next = tabs[(i + by + tabs.length) % tabs.length];
       choose(next);
       next.focus();
     });

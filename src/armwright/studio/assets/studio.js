@@ -10,6 +10,7 @@ function drawSoon() {
     drawing = false;
     drawView();
     STATS.drawn++;
+    if (film.recorder) filmFrame();
   });
 }
 
@@ -27,7 +28,7 @@ function applyState(state) {
 }
 
 function warningItem({ level, text }) {
-  return make("li", { className: level }, make("b", { textContent: level === "note" ? "Note" : level === "error" ? "Stop" : "Warning" }), text);
+  return make("li", { className: level === "collision" ? "error" : level }, make("b", { textContent: { note: "Note", warning: "Warning", error: "Error", collision: "Collision" }[level] }), text);
 }
 
 function showWarnings(state) {
@@ -36,7 +37,7 @@ function showWarnings(state) {
   if (state.near) {
     const apart = state.near.distance;
     const both = state.near.bodies.join(" and ");
-    if (apart <= 0) found.push({ level: "error", text: `${both} meet, ${number(-apart * MILLIMETRES, 1)} mm deep` });
+    if (apart <= 0) found.push({ level: "collision", text: `${both} meet, ${number(-apart * MILLIMETRES, 1)} mm deep` });
     else found.push({ level: apart < 0.01 ? "warning" : "note", text: `${both} are ${number(apart * MILLIMETRES, 1)} mm apart` });
   }
   for (const [name, arm] of Object.entries(state.arms))
@@ -47,6 +48,9 @@ function showWarnings(state) {
   if (list.dataset.key === key) return;
   list.dataset.key = key;
   list.replaceChildren(...found.map(warningItem));
+  // Whoever listens hears what stops a motion, and not every tenth of a millimetre.
+  const said = found.filter(({ level }) => level === "error" || level === "collision").map(({ text }) => text.replace(/[\d.]+/g, "")).join(". ");
+  if (byId("said").textContent !== said) byId("said").textContent = said;
 }
 
 function showLink(state) {
@@ -60,7 +64,9 @@ function showLink(state) {
         : state.control.mine
           ? state.control.asked
             ? "Another page asks for control."
-            : ""
+            : state.run && !state.run.ended
+              ? "A program runs: stop it to move arms by hand or to edit."
+              : ""
           : "Another page has control; this one follows.";
   if (line.textContent !== text) line.textContent = text;
   line.classList.toggle("bad", live.lost);
@@ -70,8 +76,8 @@ function showLink(state) {
   button.hidden = !state || live.lost || (state.control.mine && !state.control.asked);
   button.textContent = state?.control.mine ? "Hand over" : state?.control.asking ? "Asked" : "Ask for control";
   button.disabled = Boolean(state?.control.asking);
-  for (const control of document.querySelectorAll("#panel-move input, .hold, #open, #close, #panel-teach button, #panel-teach input"))
-    control.disabled = !mine();
+  for (const control of document.querySelectorAll("#panel-move input, .hold, #open, #close")) control.disabled = !canMove();
+  for (const control of document.querySelectorAll("#panel-teach button, #panel-teach input")) control.disabled = !mine();
 }
 
 function takeArm(i) {
@@ -88,9 +94,15 @@ function takeArm(i) {
 function onKeyDown(event) {
   if (event.key === "Escape") {
     letGo();
+    Object.assign(gizmo, { drag: null, target: null });
     sendNow({ do: "halt" });
+    if (live.state?.run?.playing) send({ do: "pause" });
   }
-  if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("textarea, input[type=text]")) {
+  if ((event.ctrlKey || event.metaKey) && event.key === "s" && mine()) {
+    event.preventDefault();
+    saveAll();
+  }
+  if ((event.ctrlKey || event.metaKey) && event.key === "z" && !event.target.matches("textarea, input[type=text], input[type=number]")) {
     event.preventDefault();
     send({ do: "undo" });
   }

@@ -1,6 +1,12 @@
 // Teaching: frames of the cell file, and MOVEs to them.
 
-const editorLine = () => byId("text").value.slice(0, byId("text").selectionStart).split("\n").length;
+// The line of the cursor, in the text that the server has.
+function editorLine() {
+  if (editor.timer) sendText();
+  return cursorLine();
+}
+
+const cursorLine = () => byId("text").value.slice(0, byId("text").selectionStart).split("\n").length;
 
 // Of what is taught, a frame or a joint target, with what can be done with it.
 function taughtItem(name, isTarget) {
@@ -26,16 +32,21 @@ function taughtItem(name, isTarget) {
     });
     to.addEventListener("blur", () => item.firstChild.replaceChildren(name));
   });
+  const insert = make("button", { type: "button", textContent: "Insert", title: `Insert a MOVE to ${name} behind the cursor` });
+  insert.addEventListener("click", () => {
+    const form = byId("insert-form").value;
+    send({ do: "insert", arm: arm(), frame: name, line: editorLine(), teach: false, straight: form === "straight", speed: Number(byId("insert-speed").value) });
+  });
   const forget = make("button", { type: "button", textContent: "Forget", title: `Take ${name} out of the cell file` });
   forget.addEventListener("click", () => send({ do: "forget", name }));
-  const item = make("li", {}, make("span", { className: "name" }, name), make("span", { className: "quiet" }), make("span", { className: "group" }, go, update, rename, forget));
+  const item = make("li", {}, make("span", { className: "name" }, name), make("span", { className: "quiet" }), make("span", { className: "group" }, go, ...(isTarget ? [] : [insert]), update, rename, forget));
   item.dataset.name = name;
   return item;
 }
 
 function showTeaching(state) {
   const file = state.file;
-  byId("file-name").textContent = file ? `into ${file.name}` : "there is no cell file: begin one with --new";
+  byId("file-name").textContent = file ? (file.named ? `into ${file.name}` : "into a new cell file") : "there is no cell file";
   const [frames, targets] = [Object.keys(state.around.frames), Object.keys(state.around.targets)];
   const names = [...frames, ...targets];
   const list = byId("frames");
@@ -44,11 +55,11 @@ function showTeaching(state) {
     list.dataset.names = key;
     list.replaceChildren(...names.map((name, i) => taughtItem(name, i >= frames.length)));
     frames.forEach((name, i) => {
-      for (const button of [...list.children[i].querySelectorAll("button")].slice(1)) button.hidden = !file?.frames.includes(name);
+      for (const button of [...list.children[i].querySelectorAll("button")].slice(2)) button.hidden = !file?.frames.includes(name.toUpperCase());
     });
     const on = byId("teach-on");
     const before = on.value || "WORLD";
-    on.replaceChildren(...["WORLD", ...frames].map((name) => make("option", { value: name, textContent: name })));
+    on.replaceChildren(...["WORLD", ...frames.filter((name) => file?.frames.includes(name.toUpperCase()) || name === "STATION")].map((name) => make("option", { value: name, textContent: name })));
     on.value = ["WORLD", ...frames].includes(before) ? before : "WORLD";
     followFrames(frames);
   }
@@ -58,7 +69,40 @@ function showTeaching(state) {
   });
   byId("change-card").hidden = !file?.change;
   if (byId("change").textContent !== (file?.change ?? "")) showChange(file?.change ?? "");
+  if (teaching.asked && names.some((one) => one.toUpperCase() === teaching.asked)) {
+    if (byId("teach-name").value.toUpperCase() === teaching.asked) byId("teach-name").value = "";
+    teaching.asked = "";
+  }
+  showTeachButton(names);
   if (!byId("teach-name").value && document.activeElement !== byId("teach-name")) byId("teach-name").value = freeName(names);
+}
+
+const teaching = { asked: "" };
+
+function showTeachButton(names) {
+  const name = byId("teach-name").value.toUpperCase();
+  const known = names.some((one) => one.toUpperCase() === name);
+  byId("teach-pose").textContent = known ? `Teach ${name} again` : "Teach the tool's pose";
+}
+
+// Saves, and asks for a name where there is none yet.
+function save(what) {
+  const it = what === "cell" ? live.state.file : live.state.program;
+  if (!it || it.named) {
+    send({ do: "save", what });
+    return;
+  }
+  const [dialog, field] = [byId("name-dialog"), byId("file-name-field")];
+  field.value = it.name;
+  dialog.onclose = () => dialog.returnValue === "save" && send({ do: "save", what, name: field.value.trim() });
+  dialog.returnValue = "";
+  dialog.showModal();
+}
+
+function saveAll() {
+  if (editor.timer) sendText();
+  if (live.state.program.changed) save("program");
+  else if (live.state.file?.change) save("cell");
 }
 
 function showChange(text) {
@@ -81,9 +125,11 @@ function followFrames(names) {
 
 function startTeaching() {
   const name = byId("teach-name");
+  // A name is kept until what has it is there: it may have been refused.
   const taught = () => {
-    name.value = "";
+    teaching.asked = name.value.toUpperCase();
   };
+  name.addEventListener("input", () => showTeachButton(Object.keys(live.state.around.frames)));
   byId("teach").addEventListener("submit", (event) => {
     event.preventDefault();
     send({ do: "teach", arm: chosenArm().name, name: name.value, on: byId("teach-on").value });
@@ -118,5 +164,12 @@ function startTeaching() {
   });
   byId("touch-up").addEventListener("click", () => send({ do: "touch up", line: editorLine() }));
   byId("unteach").addEventListener("click", () => send({ do: "unteach" }));
-  byId("save-cell").addEventListener("click", () => send({ do: "save", what: "cell" }));
+  byId("save-cell").addEventListener("click", () => save("cell"));
+  byId("name-dialog").querySelector("form").addEventListener("submit", () => {
+    byId("name-dialog").returnValue = "save";
+  });
+  byId("name-cancel").addEventListener("click", () => byId("name-dialog").close(""));
+  addEventListener("beforeunload", (event) => {
+    if (mine() && (live.state.program.changed || live.state.file?.change)) event.preventDefault();
+  });
 }

@@ -29,6 +29,10 @@ class CameraView:
         self._data = self._mujoco.MjData(self._model)
         self._photographer = Photographer(self._model, cell.cameras)
 
+    def close(self) -> None:
+        """Give back what the graphics hold."""
+        self._photographer.close()
+
     def picture(self, camera: str, configurations: Mapping[str, Array], parts: Mapping[str, Array]) -> bytes:
         """Return a picture as the content of a PNG file.
 
