@@ -75,6 +75,7 @@ class Session:
             rf"[Hh]old {NAME}": self._hold,
             rf"[Pp]oint at {NAME} beside {NAME}": self._point,
             r"[Pp]ut the cursor into line (\d+)": self._put_cursor,
+            rf"{NAME} shows `([^`]+)`": self._field_shows,
             r"[Tt]he page says `([^`]+)`": self._says,
             r"[Tt]he browser keeps `([^`]+)`": self._keeps,
             r"[Tt]ype this into the editor:\n\n```text\n(.*?)```": self._write,
@@ -129,6 +130,9 @@ class Session:
     def _says(self, text: str) -> None:
         body = self._page.locator("body")
         self._until(lambda: text in " ".join(body.inner_text().split()), f"the page says {text!r}")
+
+    def _field_shows(self, name: str, value: str) -> None:
+        self._until(lambda: self._field(name).input_value() == value, f"{name} shows {value}")
 
     def _keeps(self, name: str) -> None:
         self._until(lambda: name in self._downloads, f"the browser keeps {name}")
