@@ -91,7 +91,7 @@ gallery: $(VENV)/docs  ## Run the commands of the gallery, those whose sources h
 studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones (a minute)
 	$(BIN)/python docs/make_studies.py
 
-pictures: $(VENV)/core  ## Draw the pictures of the physics pages
+pictures: $(VENV)/docs  ## Draw the pictures of the physics pages, and take those of the tutorial on the studio
 	$(BIN)/python docs/pictures/make.py
 
 messages: $(VENV)/core  ## Write the page of all messages

@@ -4,6 +4,7 @@ import posixpath
 import re
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from inspect import ismodule
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,21 @@ from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
 import armwright
+import armwright.program
 from armwright.cli.app import app
+from armwright.report.page import run_page
+from armwright.report.run_data import run_page_data
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 PACKAGE = ROOT / "src" / "armwright"
 # Pages outside of docs/ that the site has too, under the same names.
 OUTSIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "benchmarks/results.md")
+# The page of a run that the first page of the site has in it: alone, and as it is in the frame there.
+LIVE, FRAMED = "live/hand-over.html", "live/hand-over-framed.html"
+LIVE_RUN = ("examples/hand_over.rlo", "examples/hand_over_cell.toml")
+# In the frame it begins with the view; what is above that on the page alone is left out.
+FRAMED_STYLE = "<style>header, .headline { display: none }</style>\n</head>"
 # The commands have a page of their own.
 NO_API = ("__main__", "cli", "version")
 
@@ -105,6 +114,29 @@ def commands_page() -> str:
     return text.replace("\n**Usage**:\n\n```console\n$ armwright [OPTIONS] COMMAND [ARGS]...\n```\n", "", 1)
 
 
+@cache
+def live_page() -> str:
+    """Return the page of a run, as the command writes it."""
+    program, cell = LIVE_RUN
+    recording = armwright.program.run(ROOT / program, cell=ROOT / cell)
+    command = f"armwright run {program} --cell {cell} -o out"
+    return run_page(run_page_data(recording, (), command))
+
+
+def live_frame(place: str) -> str:
+    """Return what a page of the site shows the page of a run in, with a link to it alone."""
+    alone, framed = (posixpath.relpath(name, posixpath.dirname(place) or ".") for name in (LIVE, FRAMED))
+    title = "The page of a run: two arms hand over a part, which can be played"
+    frame = f'<iframe class="run" src="{framed}" title="{title}" loading="lazy"></iframe>'
+    command = f"armwright run {LIVE_RUN[0]} --cell {LIVE_RUN[1]} -o out"
+    return f"{frame}\n\n`{command}` writes this page. [Open it alone]({alone})"
+
+
+def with_live_page(text: str, place: str) -> str:
+    """Return the text of a page with the page of a run instead of its picture, which readers of the files see."""
+    return re.sub(r"<!-- live -->\n!\[[^\]]*\]\([^)]*\)", lambda _: live_frame(place), text)
+
+
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Fill the parts of the navigation that come of the folders."""
     assert config.nav is not None  # noqa: S101 - mkdocs.yml has one
@@ -134,6 +166,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add what is made, and what lies outside of ``docs/``."""
     for place, text in {**api_pages(), "commands.md": commands_page()}.items():
         files.append(File.generated(config, place, content=text))
+    files.append(File.generated(config, LIVE, content=live_page()))
+    files.append(File.generated(config, FRAMED, content=live_page().replace("</head>", FRAMED_STYLE, 1)))
     for name in OUTSIDE:
         files.append(File.generated(config, name, abs_src_path=str(ROOT / name)))
     for path in sorted((ROOT / "out" / "gallery").glob("*/report.html")):
@@ -156,6 +190,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         return f"]({posixpath.relpath(inside, posixpath.dirname(place) or '.')}{found[2]})"
 
     text = re.sub(r"\]\(([^)#:\s]+)(#[^)\s]*|)\)", turned, markdown)
+    text = with_live_page(text, place)
     if place == "gallery.md":
         text = re.sub(r"<!-- page (\S+) -->", lambda found: _page_link(found[1], files), text)
     return text

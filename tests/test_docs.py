@@ -398,6 +398,27 @@ def test_studies_of_the_page(name: str) -> None:
     assert matches(told[0].rstrip().splitlines(), made["section"](name).rstrip().splitlines())
 
 
+def test_first_page_has_a_page_of_a_run() -> None:
+    """On the site the picture of the first page is a page of a run, which needs no network and begins with the view."""
+    pytest.importorskip("mkdocs", reason="the extra docs is not installed")
+    made = runpy.run_path(str(DOCS / "make_site.py"))
+
+    shown = made["with_live_page"]((DOCS / "index.md").read_text(encoding="utf-8"), "index.md")
+
+    frame = re.search(r"<iframe [^>]*>", shown)
+    assert frame is not None
+    assert {f'src="{made["FRAMED"]}"', 'loading="lazy"'} <= set(frame[0].removesuffix(">").split())
+    assert re.search(r' title="[^"]{20,}"', frame[0])
+    assert f"]({made['LIVE']})" in shown
+    assert "![" not in shown
+    page = made["live_page"]()
+    assert "default-src 'none'" in page
+    assert not re.findall(r"(?:src|href)=\"https?:", page)
+    # What the frame leaves out is there.
+    assert "<header>" in page
+    assert 'class="headline"' in page
+
+
 def test_reference_has_every_module() -> None:
     """Each folder of the house has its page in the reference, and each module stands on one page, a new one too."""
     pytest.importorskip("mkdocs", reason="the extra docs is not installed")

@@ -3,6 +3,7 @@
 import contextlib
 import io
 import re
+import runpy
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,8 @@ HOME = ROOT / "docs" / "index.md"
 TUTORIALS = sorted(path for path in (ROOT / "docs" / "tutorials").glob("*.md") if path.stem != "index")
 # The name of a file in front of what stands in it.
 FILE = re.compile(r"^Write (?:this|it) into `([\w.]+)`:$")
+# A command that serves a page; what stands below it, up to the next command, is done on the page.
+STUDIO = "$ armwright studio "
 # Blocks behind this remark take longer than a test may; what they show is tested elsewhere, as the remark says.
 LONG = "<!-- not run here:"
 
@@ -36,7 +39,10 @@ def blocks(page: Path) -> Iterator[Block]:
     """Give what a page tells to run, in order: Python with the text behind it, commands with their answers."""
     text = page.read_text(encoding="utf-8")
     found = list(re.finditer(r"^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+    on_the_page = 0
     for this, following in zip(found, [*found[1:], None], strict=True):
+        if this.start() < on_the_page:
+            continue
         before = text[: this.start()].rstrip().rpartition("\n")[2]
         lines = this[2].splitlines()
         if before.startswith(LONG):
@@ -48,6 +54,9 @@ def blocks(page: Path) -> Iterator[Block]:
             near = following is not None and not text[this.end() : following.start()].strip()
             answer = following[2].splitlines() if following is not None and near and following[1] == "text" else []
             yield Block("python", lines, answer)
+        elif this[1] == "console" and lines[0].startswith(STUDIO):
+            on_the_page = text.index("```console", this.end())
+            yield Block("studio", [lines[0][2:], text[this.end() : on_the_page]], lines[1:])
         elif this[1] == "console":
             starts = [i for i, line in enumerate(lines) if line.startswith("$ ")]
             for start, end in zip(starts, [*starts[1:], len(lines)], strict=True):
@@ -86,8 +95,17 @@ def test_numbers_that_agree() -> None:
     assert not matches(["a"], ["a", "b"])
 
 
+def followed(block: Block, folder: Path, browser: Any) -> str:
+    """Start a studio, do on its page what the tutorial says, and return what the command prints, without the secret."""
+    session = runpy.run_path(str(ROOT / "docs" / "pictures" / "follow.py"))["Session"]
+    with session(shlex.split(block.lines[0])[1:], folder, browser) as studio:
+        assert studio.follow(block.lines[1]) > 50
+        address: str = studio.address
+    return re.sub(r":\d+/\?token=[\w-]{32}$", ":41231/?token=...", address)
+
+
 @pytest.mark.parametrize("page", [HOME, *TUTORIALS], ids=lambda page: page.stem)
-def test_tutorial(page: Path, tmp_path: Path) -> None:
+def test_tutorial(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     """Who types what a tutorial says, or the first page, in its order, gets the answers it shows."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     scope: dict[str, Any] = {}
@@ -96,7 +114,10 @@ def test_tutorial(page: Path, tmp_path: Path) -> None:
 
     assert {block.kind for block in ran} >= ({"python"} if page == HOME else {"python", "command"})
     for block in ran:
-        got = trimmed(answered(block, scope, tmp_path))
+        if block.kind == "studio":
+            got = trimmed(followed(block, tmp_path, request.getfixturevalue("browser")))
+        else:
+            got = trimmed(answered(block, scope, tmp_path))
         told = trimmed("\n".join(block.answer))
         assert matches(told, got), "\n".join([*block.lines, "-- the page:", *told, "-- said:", *got])
 

@@ -1,12 +1,19 @@
-"""The pictures of the physics pages, drawn from what the package computes; `make pictures` runs this."""
+"""The pictures of the physics pages and of the tutorial on the studio; `make pictures` runs this."""
 
 import io
+import runpy
+import shlex
+import shutil
+import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from follow import Session
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from PIL import Image
 
 from armwright.arm import load_arm
 from armwright.arm.model import Arm
@@ -407,8 +414,39 @@ def before_and_after() -> Figure:
     return distances_figure(assess_calibration(arm, measured, nongeometric=True))
 
 
+# What a tutorial shows of the studio.
+
+QUALITY = 88
+
+
+def keep(photo: bytes, picture: Path) -> None:
+    """Write a photograph as JPEG, unless the one that is there is the same but for shades."""
+    coded = io.BytesIO()
+    Image.open(io.BytesIO(photo)).convert("RGB").save(coded, "JPEG", quality=QUALITY, subsampling=0, optimize=True)
+    same = runpy.run_path(str(HERE.parent / "make_gallery.py"))["alike"]
+    if not (picture.exists() and same(Image.open(coded), Image.open(picture))):
+        picture.write_bytes(coded.getvalue())
+
+
+def photograph_studio() -> None:
+    """Do what the tutorial on the studio says, and take its pictures where they stand in the text."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if chromium is None:
+        sys.stderr.write("no chromium on this machine: the pictures of the studio stay as they were\n")
+        return
+    from playwright.sync_api import sync_playwright  # noqa: PLC0415 - not needed for drawings
+
+    text = (HERE.parent / "tutorials" / "studio.md").read_text(encoding="utf-8")
+    command, _, told = text.partition("$ armwright ")[2].partition("\n")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--headless", "--no-sandbox"])
+        with Session(shlex.split(command), Path(folder), browser) as studio:
+            studio.follow(told.partition("```console")[0], lambda name, photo: keep(photo, HERE / name))
+        browser.close()
+
+
 def main() -> None:
-    """Draw all pictures."""
+    """Draw all pictures, and take those of the studio."""
     with mpl.rc_context(STYLE):
         write(configurations(), "postures.svg")
         write(released(), "released.svg")
@@ -416,6 +454,7 @@ def main() -> None:
         write(past_frames(), "past_frames.svg")
         write(rattling(), "rattling.svg")
         write(before_and_after(), "calibrated.svg")
+    photograph_studio()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """The page of a studio in a browser: moved by hand, by key and by handle, taught, run, and left alone."""
 
+import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -358,6 +360,37 @@ def test_by_keyboard_alone(opened: Opened) -> None:
     opened.until(lambda: opened.state()["run"] is not None)
     page.keyboard.press("Shift+F5")
     opened.until(lambda: opened.state()["run"] is None)
+
+
+def test_view_from_above(opened: Opened) -> None:
+    """The buttons of the view turn the camera and bring the arm into the picture, and say nothing else."""
+    page, points = opened.page, lambda: [it["points"][0] for it in page.evaluate("studio.gizmo()")]
+    first = points()
+    page.get_by_role("button", name="Top", exact=True).click()
+    opened.until(lambda: points() != first)
+    number = page.get_by_role("textbox", name="Joint 1 in °")
+    number.fill("150")
+    number.press("Enter")
+    opened.until(lambda: abs(opened.state()["arms"]["ARM_1"]["q"][0] - np.radians(150)) < 1e-6)
+    page.get_by_role("button", name="Front", exact=True).click()
+    page.wait_for_timeout(200)
+    box = page.locator("#view").bounding_box()
+    assert all(0 < it["x"] < box["width"] and 0 < it["y"] < box["height"] for it in points())
+    # The handles are drawn with the view, whatever has it drawn: nothing but the tip of an arrow is blue there.
+    tip = next(it["points"][1] for it in page.evaluate("studio.gizmo()") if (it["kind"], it["k"]) == ("move", 2))
+    shade = "([x, y]) => [...document.getElementById('view').getContext('2d').getImageData(x, y, 1, 1).data]"
+    red, _, blue, _ = page.evaluate(shade, [tip["x"] + 5, tip["y"]])
+    assert blue > red + 60
+    assert page.locator("#warnings .error").count() == 0
+
+
+def test_names_of_the_script() -> None:
+    """All scripts of the page are one: a function that has the name of another would take its place."""
+    cell = read_cell(Path(__file__).parents[2] / "examples" / "vision_cell.toml")
+    page = studio_page(Workbench(cell), token="t", policy="p")
+    names = re.findall(r"^(?:async )?function (\w+)", page, re.MULTILINE)
+    assert len(names) > 100
+    assert [name for name, count in Counter(names).items() if count > 1] == []
 
 
 def test_the_page_is_small(tmp_path: Path) -> None:

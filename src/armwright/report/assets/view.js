@@ -217,6 +217,9 @@ function nameBodies(bodies, arms) {
     for (const [name, _, frames] of arms) labels.push({ p: project(frames[0].slice(9)), text: name, below: true });
 }
 
+// What is painted over the view each time that it is drawn.
+const overpaint = [];
+
 function drawView() {
   if (!data.animation || !canvas.clientWidth) return;
   let width, height;
@@ -241,10 +244,13 @@ function drawView() {
   nameBodies(bodies, arms);
   if (!layers.labels) labels = [];
   paintLabels();
+  for (const paint of overpaint) paint();
 }
 
+// Arms that are moved by hand are elsewhere than at first.
 function look(name) {
   Object.assign(camera, LOOKS[name]);
+  Object.assign(scenery, surveyed());
   fit();
   drawView();
 }

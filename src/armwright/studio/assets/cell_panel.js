@@ -26,7 +26,7 @@ function fillDevices(devices) {
   });
 }
 
-function look() {
+function askForPicture() {
   clearTimeout(looking.timer);
   if (mine()) send({ do: "look", camera: byId("camera-name").value }, "look");
 }
@@ -43,12 +43,12 @@ function startCellPanel() {
   const cameras = data.cameras;
   byId("cameras-card").hidden = !cameras.length;
   byId("camera-name").append(...cameras.map((name) => make("option", { value: name, textContent: name })));
-  byId("look").addEventListener("click", look);
-  byId("camera-name").addEventListener("change", look);
-  byId("camera-live").addEventListener("change", look);
+  byId("look").addEventListener("click", askForPicture);
+  byId("camera-name").addEventListener("change", askForPicture);
+  byId("camera-live").addEventListener("change", askForPicture);
   answers.picture = (picture) => {
     takePicture(picture);
-    if (byId("camera-live").checked && !byId("panel-cell").hidden) looking.timer = setTimeout(look, AGAIN);
+    if (byId("camera-live").checked && !byId("panel-cell").hidden) looking.timer = setTimeout(askForPicture, AGAIN);
   };
   followers.push((state) => {
     if (!state) return;

@@ -17,7 +17,7 @@ function paintMap() {
   const { map, values } = overlay;
   if (!map) return;
   const style = getComputedStyle(document.documentElement);
-  const shades = Object.fromEntries(["bad", "warn", "line", "good"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  const shades = Object.fromEntries(["warn", "line", "good"].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   const cells = map.side - 1;
   const at = (i, j) => project(plus(plus(map.corner, map.u, i / cells), map.v, j / cells));
   pen.globalAlpha = 0.45;
@@ -25,7 +25,7 @@ function paintMap() {
   for (let j = 0; j < map.side; j++)
     for (let i = 0; i < map.side; i++) {
       const value = values[j * map.side + i];
-      if (value === 0) continue;
+      if (value === 0) continue; // out of reach
       const corners = [points[j][i], points[j][i + 1], points[j + 1][i + 1], points[j + 1][i]];
       if (corners.some(({ depth }) => depth < 0.03 * camera.distance)) continue;
       pen.fillStyle = mapColour(value, shades);

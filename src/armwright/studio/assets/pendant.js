@@ -22,7 +22,7 @@ function holdButton(text, label, message) {
       send({ do: "jog", arm: chosenArm().name, share: 1, length: size / MILLIMETRES, angle: (size * Math.PI) / 180, ...message() });
       return;
     }
-    const go = () => send({ do: "jog", arm: chosenArm().name, share: share(), ...message() }, "jog");
+    const go = () => send({ do: "jog", arm: chosenArm().name, share: jogShare(), ...message() }, "jog");
     go();
     holding.timer = setInterval(go, HELD_AGAIN);
   };
@@ -47,7 +47,7 @@ function letGo() {
 }
 
 // Slow speeds have most of the slider.
-function share() {
+function jogShare() {
   return Math.max(0.01, (Number(byId("share").value) / 100) ** 2.5);
 }
 
@@ -183,7 +183,7 @@ function startPendant() {
   fillPlace();
   fillPendant();
   const speed = () => {
-    byId("share-text").textContent = `${number(100 * share(), share() < 0.1 ? 1 : 0)} %`;
+    byId("share-text").textContent = `${number(100 * jogShare(), jogShare() < 0.1 ? 1 : 0)} %`;
   };
   byId("share").addEventListener("input", speed);
   speed();

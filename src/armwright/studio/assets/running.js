@@ -150,6 +150,8 @@ function startRunning() {
       one.tabIndex = one === tab ? 0 : -1;
       byId(one.getAttribute("aria-controls")).hidden = one !== tab;
     }
+    // Compared motions are in the view while the tab of runs is open.
+    drawSoon();
   };
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => choose(tab));

@@ -9,12 +9,6 @@ function drawSoon() {
   requestAnimationFrame(() => {
     drawing = false;
     drawView();
-    if (pen && lens) {
-      paintMap();
-      paintPaths();
-      paintGhost();
-      paintGizmo();
-    }
     STATS.drawn++;
     if (film.recorder) filmFrame();
   });
@@ -117,6 +111,7 @@ function onKeyDown(event) {
 function start() {
   startGizmo();
   startView();
+  overpaint.push(paintMap, paintPaths, paintGhost, paintGizmo);
   startOverlays();
   startStrip();
   startPendant();
@@ -158,6 +153,6 @@ function start() {
   new ResizeObserver(redraw).observe(canvas);
   showLink(null);
   connect();
-  window.studio = { live, stats: STATS, send, gizmo: () => handles().map(({ kind, k, points }) => ({ kind, k, points: points.map(project) })) };
+  window.studio = { live, stats: STATS, send, map: () => overlay.map, gizmo: () => handles().map(({ kind, k, points }) => ({ kind, k, points: points.map(project) })) };
 }
 start();
