@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,9 @@ from armwright.cell.reader import parse_cell, read_cell
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.files.inputs import read_text
 from armwright.files.output import write_back
+from armwright.files.toml_text import entries_of, value_spans, with_entry, with_name, without_entry
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.spatial.poses import inverse, to_noap
-from armwright.studio.toml_text import value_spans, with_entry, with_name, without_entry
 
 # Decimals of rotations and of positions [m] of frames, and of joint positions [rad], [m].
 _DECIMALS = np.repeat((9, 7), (9, 3))
@@ -183,8 +182,7 @@ class CellFile:
         """Return what stands in a table of the file."""
         if self.path.suffix.lower() == ".json":
             raise TeachingError(f"frames are taught into TOML files, and {self.path.name} is JSON")
-        entries: dict[str, Any] = tomllib.loads(self.text).get(table, {})
-        return entries
+        return entries_of(self.text, table)
 
     def _entry(self, name: str) -> tuple[str, str]:
         """Return the table in which something has been taught, and its key there."""

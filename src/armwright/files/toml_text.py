@@ -45,6 +45,12 @@ class _Header(NamedTuple):
     end: int
 
 
+def entries_of(text: str, table: str) -> dict[str, Any]:
+    """Return what stands in a table at the root of a TOML text; nothing where there is no such table."""
+    entries: dict[str, Any] = tomllib.loads(text).get(table, {})
+    return entries
+
+
 def with_entry(text: str, table: tuple[str, ...], key: str, value: str) -> str:
     """Return a text with a value for a key of a table; a table at the root is made where it is missing.
 

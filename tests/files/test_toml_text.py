@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from armwright.studio.toml_text import TomlLayoutError, with_entry, with_name, without_entry
+from armwright.files.toml_text import TomlLayoutError, with_entry, with_name, without_entry
 from samples import Sample
 
 HEAD = '# The cell.\nname = "a # b"  # a name\n\n[arms.ARM_1]  # the arm\nmodel = "x"\nhand = [1, 0,  # first\n  0]\n'
