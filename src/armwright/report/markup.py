@@ -91,9 +91,9 @@ def json_text(data: object) -> str:
     return text.replace("<", "\\u003c")
 
 
-def asset(name: str) -> str:
-    """Return the text of a template, a style sheet or a script."""
-    return (files("armwright.report") / "assets" / name).read_text(encoding="utf-8")
+def asset(name: str, package: str = "armwright.report") -> str:
+    """Return a file of the assets of a package."""
+    return (files(package) / "assets" / name).read_text(encoding="utf-8")
 
 
 def _to_json_types(value: object) -> object:

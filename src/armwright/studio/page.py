@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import re
-from importlib.resources import files
 from string import Template
 from typing import Any
 
@@ -74,7 +73,7 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
 
 
 def _asset(name: str) -> str:
-    return (files("armwright.studio") / "assets" / name).read_text(encoding="utf-8")
+    return asset(name, "armwright.studio")
 
 
 def _without_comments(script: str) -> str:
