@@ -20,7 +20,8 @@ function valuesOf(key) {
 
 function paintStrip() {
   const field = byId("strip-chart");
-  if (!field.clientWidth || !strip.rows.length) return;
+  // Asking for its width would lay out the page for each state, also where nothing is seen of it.
+  if (!strip.rows.length || byId("panel-trace").hidden || !field.clientWidth) return;
   const [pen, width, height] = sharpen(field);
   const quantity = QUANTITIES.find(({ key }) => key === byId("strip-quantity").value);
   const measured = quantity.key === "tau" ? "tau_measured" : `${quantity.key}_measured`;

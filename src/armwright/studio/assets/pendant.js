@@ -64,7 +64,10 @@ function sliderRow(joint, j) {
     const asked = Number.isFinite(value) && typed.value.trim();
     typed.blur();
     if (asked) set(value / factor);
-    else showPendant(live.state);
+    else {
+      typed.closest(".slider").dataset.q = "";
+      showPendant(live.state);
+    }
   });
   const along = (sign) => () => ({ frame: "JOINT", axis: j, sign });
   return make(
@@ -116,10 +119,12 @@ function showPendant(state) {
     const joint = chosenArm().joints[j];
     // An older state does not take back what is being moved.
     const moved = slider.matches(":active") || (document.activeElement === slider && (live.awaiting || live.queue.size));
+    row.classList.toggle("near", near.has(j + 1));
+    if (!moved && row.dataset.q === String(it.q[j])) return;
+    row.dataset.q = moved ? "" : it.q[j];
     if (!moved) slider.value = it.q[j];
     slider.setAttribute("aria-valuetext", quantityText(QUANTITIES[0], joint, it.q[j]));
     if (document.activeElement !== typed) typed.value = number(it.q[j] * unitFactor(QUANTITIES[0], joint), 2);
-    row.classList.toggle("near", near.has(j + 1));
   });
   [...byId("place").querySelectorAll("input")].forEach((field, k) => {
     if (it.tool && document.activeElement !== field) field.value = number(it.tool[9 + k] * MILLIMETRES, 1).replace("−", "-");
@@ -130,6 +135,10 @@ function showPendant(state) {
 
 function showSolutions(solutions) {
   const list = byId("solutions");
+  // Of solutions their names are seen, and not the numbers of each state.
+  const key = JSON.stringify(solutions.map(({ label, fault, here }) => [label, fault, here]));
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
   const allowed = solutions.filter(({ fault }) => !fault).length;
   byId("solutions-text").textContent = solutions.length ? `${allowed} of ${solutions.length} within the limits` : "";
   while (list.children.length > solutions.length) list.lastChild.remove();
