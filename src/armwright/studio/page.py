@@ -60,7 +60,7 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         policy: what the page may do, as of Content-Security-Policy.
     """
     script = _without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)]))
-    return Template(_asset("studio.html")).substitute(
+    return Template(_without_comments(_asset("studio.html"))).substitute(
         title=html.escape(f"{workbench.cell.name} - armwright studio"),
         name=html.escape(workbench.cell.name),
         policy=html.escape(policy),
@@ -77,7 +77,7 @@ def _asset(name: str) -> str:
 
 
 def _without_comments(script: str) -> str:
-    """Return a script or a style without lines of comments and blanks before lines, a seventh of it."""
+    """Return a script, a style or a page without lines of comments and blanks before lines, a seventh of it."""
     lines = map(str.strip, _BLOCK_COMMENT.sub("", script).splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
