@@ -10,7 +10,7 @@ import pytest
 
 import armwright as aw
 from armwright.cell.model import Cell, CellArm
-from armwright.errors import KindError, MissingExtraError, ShapeError
+from armwright.errors import InvalidValueError, KindError, MissingExtraError, ShapeError
 from armwright.program.api import run
 from armwright.program.language.source import Source
 
@@ -77,5 +77,7 @@ def test_wrong_things() -> None:
         aw.show(trajectory)
     with pytest.raises(KindError, match="expected an arm, a cell"):
         aw.show("puma560")  # type: ignore[arg-type]
+    with pytest.raises(InvalidValueError, match="degrees are meant"):
+        aw.show(aw.load_arm("ur5"), q=[0, -90, 90, -90, -90, 0])
     with pytest.raises(ShapeError, match="3 joints, got 6"):
         aw.show(trajectory, arm=aw.load_arm("ntu-3r"))

@@ -129,7 +129,7 @@ def has_gripper(recording: Recording, arm: str) -> bool:
 def finger_opening(recording: Recording, arm: str, t: Array, opening: float) -> Array:
     """Return the opening of the fingers at each instant, 0 to 1: as it was measured, where there are fingers.
 
-    Otherwise they are closed at the start, and fingers that close on a part stop at its sides.
+    Otherwise they are open at the start, as in the cell, and fingers that close on a part stop at its sides.
 
     Args:
         recording: of the run.
@@ -142,7 +142,7 @@ def finger_opening(recording: Recording, arm: str, t: Array, opening: float) -> 
         stream = measured[arm]
         return np.asarray(np.clip(stream.opening[nearest_ticks(stream.t, t)] / opening, 0.0, 1.0))
     tracks = part_tracks(recording)
-    times, values = [0.0], [0.0]
+    times, values = [0.0], [1.0]
     for effect in recording.effects:
         if effect.arm == arm and effect.kind in ("OPEN", "GRASP"):
             times += [effect.t0, effect.t1]

@@ -10,11 +10,13 @@ import time
 from typing import Any
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import ArrayLike, joint_array
 from armwright.cell.model import Cell, CellArm
-from armwright.errors import ArmwrightError, KindError, shown
+from armwright.errors import ArmwrightError, InvalidValueError, KindError, shown
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range
+from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.moves import Move
 from armwright.motion.trajectory import Trajectory
 from armwright.program.vm.recording import Recording
@@ -85,6 +87,7 @@ def show(
 
     Raises:
         KindError: it is something else, or a trajectory of no arm.
+        InvalidValueError: joint positions are beyond the limits of the arm.
         MissingExtraError: anywidget is not installed.
     """
     if isinstance(thing, Recording):
@@ -97,6 +100,10 @@ def show(
         return PageFrame(run_page(motion_page(along_trajectory(arm, thing))))
     if isinstance(thing, Arm):
         start = mid_range(thing) if q is None else joint_array(q, thing.n)
+        if mistake := degrees_by_mistake(thing, start):
+            raise InvalidValueError(f"q: {mistake}")
+        for fault in violations(thing, start):
+            raise InvalidValueError(f"q: {fault}")
         return live_widget(Cell(name=thing.name, arms={"ARM_1": CellArm(arm=thing, start=start)}))
     if isinstance(thing, Cell):
         return live_widget(thing)
