@@ -141,7 +141,8 @@ def test_entities_are_not_expanded(tmp_path: Path) -> None:
     laughs = "".join(f"<!ENTITY l{i + 1} '{f'&l{i};' * 10}'>" for i in range(9))
     path.write_text(f"<!DOCTYPE robot [<!ENTITY l0 'ha'>{laughs}]><robot name='r'><link name='a'/>&l9;</robot>")
 
-    assert "Maximum entity amplification factor exceeded" in refused(lambda: load_urdf(path))
+    # Versions of libxml2 call it an amplification or a loop.
+    assert re.search("entity (amplification|reference loop)", refused(lambda: load_urdf(path)))
     secret = tmp_path / "secret"
     secret.write_text("swordfish")
     path.write_text(f"<!DOCTYPE robot [<!ENTITY s SYSTEM '{secret}'>]><robot name='r'><link name='a'/>&s;</robot>")
@@ -369,6 +370,8 @@ def test_a_table_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(inputs, "_PIECE_BYTES", 1 << 12)
     path = tmp_path / "long.csv"
     path.write_text("a,b\n" + "1.25,2.5\n" * 5000)
+    # What reading imports is none of its memory.
+    next(read_rows(path)[1])
     tracemalloc.start()
 
     count = sum(1 for _ in read_rows(path)[1])
