@@ -16,7 +16,7 @@ from armwright.spatial.poses import from_noap, homogeneous
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
-_NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
+NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
 # Orthonormality error of a rotation: two digits deviate by up to 0.018 and are made exact; more is a mistake.
 _MAX_ROTATION_ERROR = 2e-2
 
@@ -27,7 +27,7 @@ def read_name(table: Table, key: str, taken: Iterable[str], text: str | None = N
     name, match = written.upper(), ARM_NAME.fullmatch(written)
     if text is not None and match:
         return arm_name(match[1])
-    if not _NAME.fullmatch(written) or (text is None and (name == WORLD or match)):
+    if not NAME.fullmatch(written) or (text is None and (name == WORLD or match)):
         raise table.error(
             key, f"{written!r} cannot name a frame or device: letters A to Z, digits and _, not WORLD or an arm"
         )

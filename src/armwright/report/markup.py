@@ -71,10 +71,11 @@ def page_html(
         script = "\n".join(asset(name) for name in (*moving, *scripts))
         after = asset("film.html") * film + Template(_SCRIPT).substitute(data=json_text(data), script=script)
         styles = ("film.css", *styles) if film else styles
+    allowed = "script-src 'unsafe-inline'; " if scripts else ""
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; {allowed}img-src data:"
     return Template(asset("page.html")).substitute(
+        head=page_head(title, policy, "\n".join(asset(name) for name in ("page.css", *styles))),
         title=html.escape(title),
-        script_policy="script-src 'unsafe-inline'; " if scripts else "",
-        style="\n".join(asset(name) for name in ("page.css", *styles)),
         badge=badge,
         facts=facts,
         notes=notes,
@@ -82,6 +83,19 @@ def page_html(
         main=main,
         generated=html.escape(generated),
         after=after,
+    )
+
+
+def page_head(title: str, policy: str, style: str) -> str:
+    """Return the beginning of a page, up to the end of its head, which is open.
+
+    Args:
+        title: plain text.
+        policy: what the page may do, as of Content-Security-Policy.
+        style: its style sheet.
+    """
+    return Template(asset("head.html")).substitute(
+        title=html.escape(title), policy=html.escape(policy, quote=False), style=style
     )
 
 

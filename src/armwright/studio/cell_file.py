@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.entries import NAME
 from armwright.cell.frames import WORLD
 from armwright.cell.reader import parse_cell, read_cell
 from armwright.errors import ArmwrightError, UnknownNameError
@@ -28,9 +29,8 @@ _JOINT_DECIMALS = 7
 _MOST_UNDONE = 200
 # Tables of what is taught, and the parts of the path of an entry in one line.
 _TABLES, _INLINE = ("frames", "joint_targets"), 2
-# What pages call axes, and the longest name of the language.
-_AXES, _LONGEST_NAME = frozenset(("BASE", "TOOL", "JOINT")), 31
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+# What pages call axes.
+_AXES = frozenset(("BASE", "TOOL", "JOINT"))
 
 
 class TeachingError(ArmwrightError, ValueError):
@@ -195,12 +195,13 @@ class CellFile:
 
     @staticmethod
     def _check_name(name: str) -> None:
-        if not _NAME.match(name):
+        if not NAME.fullmatch(name):
             raise TeachingError(f"a name has letters, digits and _, and begins with a letter, got {name!r}")
-        if name.upper() in VOCABULARIES[Standard.RLO_2].reserved or name.upper() in _AXES:
+        vocabulary = VOCABULARIES[Standard.RLO_2]
+        if name.upper() in vocabulary.reserved or name.upper() in _AXES:
             raise TeachingError(f"{name.upper()} has a meaning of its own and cannot be a name")
-        if len(name) > _LONGEST_NAME:
-            raise TeachingError(f"a name has at most {_LONGEST_NAME} characters, got {len(name)}")
+        if len(name) > vocabulary.longest_name:
+            raise TeachingError(f"a name has at most {vocabulary.longest_name} characters, got {len(name)}")
 
     def _take(self, text: str) -> None:
         """Take a changed text, if it is that of a cell."""

@@ -47,7 +47,7 @@ _STRIDE, _TURN = 0.03, math.radians(10.0)
 # Poses are the same within this: of the configuration that was found for one.
 _SAME = 1e-9
 
-Level: TypeAlias = Literal["note", "warning", "error"]
+Level: TypeAlias = Literal["warning", "error"]
 
 
 class UnreachableError(ArmwrightError, ValueError):
@@ -74,13 +74,13 @@ class Remark(NamedTuple):
     """What is to be said of a configuration.
 
     Attributes:
-        kind: ``limit``, ``singular``, ``collision`` or ``reach``.
+        kind: ``limit`` or ``singular``.
         level: how bad it is.
         text: in words.
         joints: numbers of the joints concerned, from 1.
     """
 
-    kind: Literal["limit", "singular", "collision", "reach"]
+    kind: Literal["limit", "singular"]
     level: Level
     text: str
     joints: tuple[int, ...] = ()
@@ -103,7 +103,7 @@ class LiveArm:
         # An arm with fewer joints than a pose has numbers is led by the position of its tool alone.
         self._rows = slice(0, 6 if placed.arm.n >= _POSE else 3)
         self.lower, self.upper = limits.lower, limits.upper
-        revolute = np.array([joint.revolute for joint in placed.arm.joints])
+        revolute = placed.arm.revolute
         self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
         self._near = np.where(revolute, _NEAR_ANGLE, _NEAR_LENGTH)
         self._geometry = find_geometry(placed.arm)
@@ -167,35 +167,45 @@ class LiveArm:
 
     def _branches(self, X_WT: Array) -> Array:
         """Return the configurations (k, n) that bring the tool to a pose."""
-        assert self.equations is not None  # noqa: S101 - asked for only then
         # A tool that is dragged is asked about twice: where it can be, and where it is.
         known, rows = self._latest
         if known.shape == X_WT.shape and np.abs(X_WT - known).max() < _SAME:
             return rows
-        X_BT = inverse(self.placed.base) @ X_WT
-        q, _ = self.equations.inverse_branches(X_BT, self.q)
-        q = self.turned(q[self._is_met(self.equations.forward(q), X_BT)])
+        q, met = self.every_branch(X_WT, self.q)
+        q = q[met]
         # A branch that a pose does not have repeats another.
         same = np.abs(q[:, None] - q).max(axis=2, initial=0.0) < _MET
         rows = np.asarray(q[~np.tril(same, -1).any(axis=1)])
         self._latest = np.array(X_WT), rows
         return rows
 
-    def turned(self, q: Array) -> Array:
+    def every_branch(self, X_WT: Array, near: Array) -> tuple[Array, Flags]:
+        """Return the configurations of all branches for poses, and which of them bring the tool there.
+
+        Args:
+            X_WT: (..., 4, 4) poses of the tool in the world.
+            near: (..., n) configurations, for what a singular pose leaves open.
+
+        Returns:
+            (..., k, n) and (..., k).
+        """
+        assert self.equations is not None  # noqa: S101 - asked for only where there is a closed form
+        X_BT = inverse(self.placed.base) @ X_WT
+        q, _ = self.equations.inverse_branches(X_BT, near, threads=1)
+        missed = np.abs(self.equations.forward(q, threads=1) - X_BT[..., None, :, :])
+        return self._turned(q), np.asarray(missed.max(axis=(-2, -1)) < _MET)
+
+    def _turned(self, q: Array) -> Array:
         """Return configurations (..., n) with every angle turned by a revolution into its limits, where possible."""
         # An angle on its limit stays there, whatever rounding says.
         below, above = q < self.lower - _SAME, q > self.upper + _SAME
         turn = 2 * math.pi * (below.astype(float) - above)
-        better = (below | above) & (q + turn >= self.lower) & (q + turn <= self.upper) & self._revolute
+        better = (below | above) & (q + turn >= self.lower) & (q + turn <= self.upper) & self.placed.arm.revolute
         return np.where(better, q + turn, q)
 
-    @cached_property
-    def _revolute(self) -> Flags:
-        return np.array([joint.revolute for joint in self.placed.arm.joints])
-
-    def _is_met(self, X: Array, goal: Array) -> Array:
-        """Whether poses (..., 4, 4) are a goal."""
-        return np.asarray(np.abs(X - goal).max(axis=(-2, -1)) < _MET)
+    def is_allowed(self, q: Array) -> Flags:
+        """Return which configurations (..., n) are within the limits."""
+        return np.asarray(((q >= self.lower - _SAME) & (q <= self.upper + _SAME)).all(axis=-1))
 
     # ---- moving --------------------------------------------------------------------------------------------------
 
@@ -256,7 +266,7 @@ class LiveArm:
         rows = self._branches(X_WT)
         if not len(rows):
             raise UnreachableError(f"out of reach of {self.name}")
-        allowed = ((rows >= self.lower - 1e-9) & (rows <= self.upper + 1e-9)).all(axis=1)
+        allowed = self.is_allowed(rows)
         distances = joint_distances(self.placed.arm, self.q, rows)
         if not allowed.any():
             nearest = rows[distances.argmin()]

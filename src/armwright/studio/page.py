@@ -13,7 +13,7 @@ from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, 
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.report.animation import Animation, FrameTrack, MovedPart
 from armwright.report.arm_figure import arm_figure
-from armwright.report.markup import asset, json_text
+from armwright.report.markup import asset, json_text, page_head
 from armwright.report.run_scene import fixture_bodies, placed_arms
 from armwright.report.shape_table import ShapeTable
 from armwright.report.stick_figure import arm_record
@@ -60,13 +60,10 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         policy: what the page may do, as of Content-Security-Policy.
     """
     script = _without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)]))
+    style = _without_comments("\n".join([*map(asset, ("page.css", "film.css", "view.css")), _asset("studio.css")]))
     return Template(_without_comments(_asset("studio.html"))).substitute(
-        title=html.escape(f"{workbench.cell.name} - armwright studio"),
+        head=page_head(f"{workbench.cell.name} - armwright studio", policy, style),
         name=html.escape(workbench.cell.name),
-        policy=html.escape(policy),
-        style=_without_comments(
-            "\n".join([asset("page.css"), asset("film.css"), asset("view.css"), _asset("studio.css")])
-        ),
         data=json_text({**_shown_first(workbench), "token": token}),
         script=script,
     )

@@ -209,8 +209,7 @@ class ProgramRun:
 
     def _compute_view(self) -> _Computed:
         debugger = self._debugger
-        machine, execution = debugger.machine, debugger.execution
-        end = max(execution.tick, machine.state.ticks) * self._cell.period
+        machine, end = debugger.machine, self._come_to()
         trees = tuple(machine.state.trees)
         if debugger.running or debugger.stop is None:
             return _Computed(machine, trees, end, debugger.running, debugger.stop)
@@ -223,9 +222,12 @@ class ProgramRun:
 
     def _is_ahead(self) -> bool:
         """Whether the program is ahead of what is shown."""
+        return self._debugger.running or self._come_to() > self.time + _SAME
+
+    def _come_to(self) -> float:
+        """Return how far the program has come [s], which takes the debugger itself a view of all arms."""
         execution = self._debugger.execution
-        end = max(execution.tick, execution.machine.state.ticks) * self._cell.period
-        return self._debugger.running or end > self.time + _SAME
+        return max(execution.tick, execution.machine.state.ticks) * self._cell.period
 
     def _rewind(self) -> None:
         """Go back to what is shown, if the program is ahead of it."""

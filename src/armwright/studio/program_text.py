@@ -94,7 +94,7 @@ class ProgramText:
         self.path, self._cell = path, cell
         self._saved = text if path is not None else ""
         self.text, self.version = text, 0
-        self._compile()
+        self._take_compiled(self._compiled(text))
 
     @property
     def name(self) -> str:
@@ -109,7 +109,7 @@ class ProgramText:
     def set_cell(self, cell: Cell) -> None:
         """Take another cell, in which frames may have other names."""
         self._cell = cell
-        self._compile()
+        self._take_compiled(self._compiled(self.text))
 
     def replace(self, text: str) -> None:
         """Take another text.
@@ -118,11 +118,15 @@ class ProgramText:
             ProgramTextError: it is too long, or no text.
         """
         _check_text(text)
-        self.text, self.version = text.replace("\r\n", "\n"), self.version + 1
-        self._compile()
+        self._take(self._compiled(text.replace("\r\n", "\n")))
 
-    def _compile(self) -> None:
-        self.compiled = self._compiled(self.text)
+    def _take(self, compiled: Compilation) -> None:
+        """Take another text that has been compiled."""
+        self.text, self.version = compiled.source.text, self.version + 1
+        self._take_compiled(compiled)
+
+    def _take_compiled(self, compiled: Compilation) -> None:
+        self.compiled = compiled
         self.compilations += 1
         self._diagnostics = [self._diagnostic_state(it) for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]]
 
@@ -179,9 +183,7 @@ class ProgramText:
             ProgramTextError: it has no file.
             OutputError: the file cannot be written, or somebody else has changed it meanwhile.
         """
-        if self.path is None:
-            raise ProgramTextError("the program has no file yet; give it a name")
-        write_back(self.path, self._saved, self.text, "program_mb")
+        write_back(self._file(), self._saved, self.text, "program_mb")
         self._saved = self.text
 
     def reload(self) -> None:
@@ -191,10 +193,13 @@ class ProgramText:
             ProgramTextError: it has no file.
             FileFormatError: the file cannot be read.
         """
+        self._saved = read_program(self._file())
+        self.replace(self._saved)
+
+    def _file(self) -> Path:
         if self.path is None:
             raise ProgramTextError("the program has no file yet; give it a name")
-        self._saved = read_program(self.path)
-        self.replace(self._saved)
+        return self.path
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 
@@ -240,7 +245,7 @@ class ProgramText:
         """
         if not 0 <= blend <= _LONGEST_LINE:
             raise ProgramTextError(f"blend: expected 0 to {_LONGEST_LINE * 1e3:g} mm, got {blend * 1e3:g}")
-        move = self.check_via(line)
+        move = self._move_to_go_past(line)
         past = next((it for it in move.clauses if isinstance(it, Via)), None)
         between = self.text[move.goal.span.end : move.clauses[0].span.start] if move.clauses else ","
         separator = "" if "," in between else ","
@@ -255,7 +260,7 @@ class ProgramText:
             rounded = last, f", WITH BLEND = {blend * 1e3:g}mm"
         self._insert(place, rounded, self._declaration(frame))
 
-    def check_via(self, line: int) -> Move:
+    def _move_to_go_past(self, line: int) -> Move:
         """Return the MOVE in a line if it can go past a frame.
 
         Raises:
@@ -279,10 +284,12 @@ class ProgramText:
         for _, (offset, piece) in sorted(enumerate(pieces), key=lambda it: (it[1][0], it[0]), reverse=True):
             text = text[:offset] + piece + text[offset:]
         before = sum(it.is_error for it in self.compiled.diagnostics)
-        errors = [it for it in self._compiled(text).diagnostics if it.is_error]
-        if len(errors) > before:
-            raise ProgramTextError(f"the program would have an error: {errors[0].code}: {errors[0].message}")
-        self.replace(text)
+        _check_text(text)
+        compiled = self._compiled(text)
+        if sum(it.is_error for it in compiled.diagnostics) > before:
+            error = first_error(compiled)
+            raise ProgramTextError(f"the program would have an error: {error.code}: {error.message}")
+        self._take(compiled)
 
     def _declaration(self, frame: str) -> tuple[int, str]:
         """Return where what declares a frame is to be inserted, and that; nothing where it is declared."""
@@ -377,8 +384,7 @@ class ProgramText:
             text = text[: it.span.start] + empty + text[it.span.end :]
         part = self._compiled(text)
         if part.code is None:
-            error = next(it for it in part.diagnostics if it.is_error)
-            raise ProgramTextError(f"from line {line} on the program cannot run by itself: {error.message}")
+            raise ProgramTextError(f"from line {line} on the program cannot run by itself: {first_error(part).message}")
         return part
 
     # ---- what is shown -------------------------------------------------------------------------------------------
@@ -414,11 +420,18 @@ class ProgramText:
         }
 
 
+def first_error(compiled: Compilation) -> Diagnostic:
+    """Return the first error of a program that has one."""
+    return next(it for it in compiled.diagnostics if it.is_error)
+
+
 def _check_text(text: str) -> None:
     if len(text) > _LONGEST:
         raise ProgramTextError(f"a program has at most {_LONGEST:,} characters, got {len(text):,}")
-    if any("\ud800" <= character <= "\udfff" for character in text):
-        raise ProgramTextError("half of a character is no text")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ProgramTextError("half of a character is no text") from None
 
 
 def moved_lines(lines: Iterable[int], before: str, after: str) -> set[int]:

@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
@@ -21,7 +20,7 @@ from armwright.program.api import add_imported_frames
 from armwright.studio.cell_file import CellFile, TeachingError
 from armwright.studio.comparison import KeptMotion, kept_motion
 from armwright.studio.program_run import ProgramRun
-from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError, moved_lines
+from armwright.studio.program_text import MoveForm, ProgramText, ProgramTextError, first_error, moved_lines
 from armwright.studio.workbench import Workbench
 
 _MOST_BREAKPOINTS = 1000
@@ -37,6 +36,7 @@ class Project:
         file: into which frames are taught; None where there is none.
         program: its text.
         run: of the program; None where none runs.
+        run_number: counts the runs.
         breakpoints: lines of the program.
         devices: that are on, while no program runs.
         compared: motions of earlier runs that are shown beside one another, at most two.
@@ -61,7 +61,7 @@ class Project:
         self.breakpoints: set[int] = set()
         self.devices: set[str] = set()
         self.compared: list[KeptMotion] = []
-        self._kept = 0
+        self.run_number = self._kept = 0
         self.executor: Executor | None = None
         self._camera_view: tuple[Cell, CameraView] | None = None
 
@@ -85,16 +85,11 @@ class Project:
             name: of the frame.
             on: the frame that it hangs on; as before, or WORLD, when left out.
         """
-        known = self._teachable().cell.frames.get(name.upper())
-        parent = WORLD if known is None else known.parent
-        self._teach(name, self.workbench.arm(arm).tool, on or parent)
-
-    def _teach(self, name: str, X_WF: Array, on: str) -> None:
+        file, X_WF = self._teachable(), self.workbench.arm(arm).tool
+        known = file.cell.frames.get(name.upper())
+        on = on.upper() or (WORLD if known is None else known.parent)
         # A program that has run may have moved the frame that is shown; the file has it where it is at the start.
-        file, on = self._teachable(), on.upper()
-        tree = file.cell.tree()
-        for each, arm in self.workbench.arms.items():
-            tree = tree.set_pose(each, arm.tool)
+        tree = self.workbench.with_tools(file.cell.tree())
         if on != WORLD and (on not in tree or on in self.workbench.arms):
             raise UnknownNameError("frame", on, [it for it in tree if it not in self.workbench.arms])
         file.teach(name, X_WF, on, None if on == WORLD else tree.world(on))
@@ -155,9 +150,6 @@ class Project:
             form: of the MOVE.
             teach: whether the frame is taught; otherwise it is one that there is.
         """
-        form.clauses(arm, frame)
-        self.workbench.arm(arm)
-        self.program.require_statements()
         if teach:
             self.teach(arm, frame)
         elif frame.upper() not in self.workbench.cell.tree():
@@ -166,7 +158,6 @@ class Project:
 
     def insert_via(self, arm: str, frame: str, line: int, blend: float) -> None:
         """Teach a frame where the tool is, and let the MOVE in a line go past it; both or neither."""
-        self.program.check_via(line)
         self.teach(arm, frame)
         self._change_program(lambda: self.program.insert_via(line, frame.upper(), blend), taught=True)
 
@@ -195,8 +186,7 @@ class Project:
             raise TeachingError(f"{goal} is not a frame of {file.path.name}, so its pose cannot be touched up there")
         arms = list(self.workbench.arms)
         arm = arms[0] if len(arms) == 1 else self.program.moved_in(line)
-        parent = file.cell.frames[key].parent
-        self._teach(key, self.workbench.arm(arm).tool, parent)
+        self.teach(arm, key)
 
     # ---- running -------------------------------------------------------------------------------------------------
 
@@ -243,10 +233,11 @@ class Project:
             compiled, cell = self.program.part_from(line, only=only), self.workbench.cell_as_shown()
         cell = add_imported_frames(cell, compiled.imports) or cell
         if compiled.code is None:
-            error = next(it for it in compiled.diagnostics if it.is_error)
+            error = first_error(compiled)
             where = compiled.source.line(error.span.start)
             raise ProgramTextError(f"line {where}: {error.code}: {error.message}")
         hardware: HardwareFactory = PhysicsCell if physics else kinematic_cell
+        self.run_number += 1
         self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints, self.executor)
         self.run.begin(stop_on_entry=entry)
 

@@ -9,7 +9,6 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.spatial.poses import inverse
 from armwright.studio.live_arm import LiveArm, UnreachableError
 
 Plane: TypeAlias = Literal["xy", "xz", "yz"]
@@ -74,12 +73,9 @@ class ReachMap:
         live = self._live
         if live.equations is None or not live.closed:
             return np.array([self._by_steps(X) for X in X_WT])
-        X_BT = inverse(live.placed.base) @ X_WT
-        q, _ = live.equations.inverse_branches(X_BT, np.broadcast_to(self._q, (len(X_BT), len(self._q))), threads=1)
-        met = np.abs(live.equations.forward(q, threads=1) - X_BT[:, None]).max(axis=(-2, -1)) < 1e-6
-        turned = live.turned(q)
-        allowed = met & ((turned >= live.lower - 1e-9) & (turned <= live.upper + 1e-9)).all(axis=-1)
-        sigma = np.linalg.svd(live.scaled_jacobian(live.equations.jacobian(turned, threads=1)), compute_uv=False)
+        q, met = live.every_branch(X_WT, np.broadcast_to(self._q, (len(X_WT), len(self._q))))
+        allowed = met & live.is_allowed(q)
+        sigma = np.linalg.svd(live.scaled_jacobian(live.equations.jacobian(q, threads=1)), compute_uv=False)
         dexterity = np.where(allowed, sigma[..., -1] / sigma[..., 0], 0.0).max(axis=1)
         values = _level(dexterity)
         return np.where(allowed.any(axis=1), values, np.where(met.any(axis=1), _BEYOND_LIMITS, _OUT_OF_REACH))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from armwright.program.vm.recording import Effect
+from armwright.program.vm.recording import Effect, sort_effects
 
 # Times are the same within this [s].
 _SAME = 1e-9
@@ -49,7 +49,7 @@ class ShownEffects:
         if not begun:
             return
         self._waiting = [effect for effect in self._waiting if effect.t0 > time + _SAME]
-        begun.sort(key=lambda effect: (effect.t0, effect.order))
+        begun = list(sort_effects(begun))
         self.begun += begun
         for effect in begun:
             self.latest[effect.process] = effect

@@ -191,12 +191,10 @@ class Studio:
             case m.Keep():
                 self.workbench.arm(command.arm)
                 run, what, arm = project.running(), command.what, command.arm
-                if len(self.jobs) >= _MOST_JOBS:
-                    raise MessageError("too much is being made already; wait a moment")
+                self._check_jobs()
                 self.jobs.append((page, lambda: download(run.recording(), what, arm).message()))
             case m.Look():
-                if len(self.jobs) >= _MOST_JOBS:
-                    raise MessageError("too many pictures are being taken already; wait a moment")
+                self._check_jobs()
                 take, camera = project.camera_picture(command.camera), command.camera
                 self.jobs.append((page, lambda: _picture_message(camera, take())))
             case m.Complete():
@@ -205,6 +203,10 @@ class Studio:
             case m.Describe():
                 text = program.description(command.offset)
                 self.jobs.append((page, lambda: {"description": text}))
+
+    def _check_jobs(self) -> None:
+        if len(self.jobs) >= _MOST_JOBS:
+            raise MessageError("too much is being made already; wait a moment")
 
     def _do_running(self, command: m.Command, page: int) -> None:
         project = self.project
@@ -290,8 +292,9 @@ class Studio:
     def _seldom_changed(self) -> dict[str, tuple[object, Callable[[], Any]]]:
         """Return what is sent only when it changes, by its key in the state: what it depends on, and what makes it."""
         project, bench, run = self.project, self.workbench, self.project.run
-        arms = bench.arms
         pictures = () if run is None else run.pictures()
+        # What a run shows depends on which it is, and on how far its paths are known.
+        moved = () if run is None else (project.run_number, run.path_key)
         program, file = project.program, project.file
         breakpoints = sorted(project.breakpoints)
         return {
@@ -307,11 +310,11 @@ class Studio:
                 lambda: None if bench.map is None else bench.map.state(),
             ),
             "paths": (
-                (id(run), None if run is None else run.path_key),
-                lambda: {} if run is None else {name: run.path(name) for name in arms},
+                moved,
+                lambda: {} if run is None else {name: run.path(name) for name in bench.arms},
             ),
             "trace": (
-                (id(run), 0 if run is None else len(run.happened.begun), None if run is None else run.path_key),
+                (moved, 0 if run is None else len(run.happened.begun)),
                 lambda: [] if run is None else run.trace(),
             ),
             "compared": (
@@ -319,7 +322,7 @@ class Studio:
                 lambda: [motion.state() for motion in project.compared],
             ),
             "picture": (
-                (id(run), len(pictures), pictures[-1].time if pictures else None),
+                (project.run_number if pictures else 0, len(pictures), pictures[-1].time if pictures else None),
                 lambda: _picture_state(pictures[-1]) if pictures else None,
             ),
         }

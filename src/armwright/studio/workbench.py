@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell, base_name
 from armwright.cell.part_poses import PartPoses
 from armwright.errors import UnknownNameError
@@ -200,8 +201,7 @@ class Workbench:
     def grip(self, name: str, *, open_it: bool, now: float) -> None:
         """Open or close the gripper of an arm; it takes the part that is between its fingers."""
         self.arm(name)
-        hands = {each: arm.tool for each, arm in self.arms.items()}
-        (self._parts.open if open_it else self._parts.close)(name, hands, now)
+        (self._parts.open if open_it else self._parts.close)(name, self._tools(), now)
         self._checks = None
         self._changes += 1
 
@@ -252,8 +252,17 @@ class Workbench:
 
     def part_poses(self) -> dict[str, Array]:
         """Return the poses (4, 4) of the parts in the world."""
-        hands = {name: arm.tool for name, arm in self.arms.items()}
-        return {name: self._parts.in_world(name, hands) for name in self.cell.parts}
+        tools = self._tools()
+        return {name: self._parts.in_world(name, tools) for name in self.cell.parts}
+
+    def _tools(self) -> dict[str, Array]:
+        return {name: arm.tool for name, arm in self.arms.items()}
+
+    def with_tools(self, tree: FrameTree) -> FrameTree:
+        """Return a frame tree with the tools of the arms where they are shown."""
+        for name, X in self._tools().items():
+            tree = tree.set_pose(name, X)
+        return tree
 
     def cell_as_shown(self) -> Cell:
         """Return the cell with arms and parts where they are shown."""
@@ -291,9 +300,7 @@ class Workbench:
 
     def frame_poses(self) -> dict[str, Array]:
         """Return the poses (4, 4) of the frames of the cell in the world, by name."""
-        tree, hidden = self._tree, {"WORLD", *self.arms, *map(base_name, self.arms)}
-        for name, arm in self.arms.items():
-            tree = tree.set_pose(name, arm.tool)
+        tree, hidden = self.with_tools(self._tree), {"WORLD", *self.arms, *map(base_name, self.arms)}
         return {self._spelled(name): tree.world(name) for name in tree if name not in hidden and tree.has_value(name)}
 
     @cached_property

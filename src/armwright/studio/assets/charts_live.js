@@ -18,6 +18,15 @@ function valuesOf(key) {
   return strip.rows.filter((row) => row[key]);
 }
 
+// The largest value that a chart has of each joint: its limit or, without one, the largest in rows.
+function scalesOf(quantity, rows) {
+  return chosenArm().joints.map((joint, j) => {
+    const [low, high] = limitsOf(quantity, joint);
+    if (high !== null && low !== null) return Math.max(Math.abs(low), Math.abs(high));
+    return Math.max(1e-9, ...rows.map((row) => Math.abs(row?.[j] ?? 0)));
+  });
+}
+
 function paintStrip() {
   const field = byId("strip-chart");
   // Asking for its width would lay out the page for each state, also where nothing is seen of it.
@@ -30,11 +39,7 @@ function paintStrip() {
   const [from, to] = [Math.max(0, rows.at(-1).t - KEPT), Math.max(KEPT, rows.at(-1).t)];
   const x = (t) => 40 + ((t - from) / (to - from)) * (width - 48);
   // Each joint as a part of its limit, or of its largest value.
-  const most = joints.map((joint, j) => {
-    const [low, high] = limitsOf(quantity, joint);
-    const seen = Math.max(1e-9, ...rows.flatMap((row) => [row[quantity.key]?.[j] ?? 0, row[measured]?.[j] ?? 0]).map(Math.abs));
-    return high === null || low === null ? seen : Math.max(Math.abs(low), Math.abs(high));
-  });
+  const most = scalesOf(quantity, rows.flatMap((row) => [row[quantity.key], row[measured]]));
   const y = (value, j) => height / 2 - (value / most[j]) * (height / 2 - 8);
   pen.font = "10px system-ui, sans-serif";
   pen.fillStyle = colours.quiet;

@@ -34,11 +34,7 @@ function paintComparison() {
   const motions = motionsOfArm();
   const quantity = QUANTITIES.find(({ key }) => key === byId("strip-quantity").value);
   const joints = chosenArm().joints;
-  const most = joints.map((joint, j) => {
-    const [low, high] = limitsOf(quantity, joint);
-    const seen = Math.max(1e-9, ...motions.flatMap((motion) => motion[quantity.key].map((row) => Math.abs(row[j]))));
-    return high === null || low === null ? seen : Math.max(Math.abs(low), Math.abs(high));
-  });
+  const most = scalesOf(quantity, motions.flatMap((motion) => motion[quantity.key]));
   const end = Math.max(...motions.map(({ duration }) => duration), 1e-3);
   motions.forEach((motion, k) => {
     const field = byId(`compare-chart-${k}`);

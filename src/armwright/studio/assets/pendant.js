@@ -51,6 +51,12 @@ function jogShare() {
   return Math.max(0.01, (Number(byId("share").value) / 100) ** 2.5);
 }
 
+// The number in a text field, in either spelling; null where there is none.
+function typedNumber(field) {
+  const value = Number(field.value.replace("−", "-").replace(",", "."));
+  return field.value.trim() && Number.isFinite(value) ? value : null;
+}
+
 function sliderRow(joint, j) {
   const factor = unitFactor(QUANTITIES[0], joint);
   const [low, high] = [joint.lower ?? (joint.kind === "revolute" ? -TURN : -1), joint.upper ?? (joint.kind === "revolute" ? TURN : 1)];
@@ -60,10 +66,9 @@ function sliderRow(joint, j) {
   const set = (value) => send({ do: "joint", arm: chosenArm().name, joint: j + 1, value }, `joint ${j}`);
   slider.addEventListener("input", () => set(Number(slider.value)));
   typed.addEventListener("change", () => {
-    const value = Number(typed.value.replace("−", "-").replace(",", "."));
-    const asked = Number.isFinite(value) && typed.value.trim();
+    const value = typedNumber(typed);
     typed.blur();
-    if (asked) set(value / factor);
+    if (value !== null) set(value / factor);
     else {
       typed.closest(".slider").dataset.q = "";
       showPendant(live.state);
@@ -176,10 +181,10 @@ function fillPlace() {
     ...["x", "y", "z"].map((name, k) => {
       const field = make("input", { type: "text", inputMode: "decimal", ariaLabel: `Tool ${name} in mm` });
       field.addEventListener("change", () => {
-        const value = Number(field.value.replace("−", "-").replace(",", "."));
+        const value = typedNumber(field);
         const pose = [...armState().tool];
         pose[9 + k] = value / MILLIMETRES;
-        if (Number.isFinite(value) && field.value.trim()) send({ do: "tool", arm: chosenArm().name, pose, leaping: true });
+        if (value !== null) send({ do: "tool", arm: chosenArm().name, pose, leaping: true });
         field.blur();
       });
       return make("label", {}, name, " ", field);
