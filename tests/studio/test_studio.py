@@ -434,8 +434,7 @@ def test_what_a_camera_sees() -> None:
     for value in (0.0, 0.4):
         studio.receive(json.dumps({"do": "joint", "arm": "ARM_1", "joint": 1, "value": value}), 1, 0.0)
         studio.receive(json.dumps({"do": "look", "camera": camera}), 1, 0.0)
-        ((_, job),) = studio.jobs
-        studio.jobs.clear()
+        ((_, job),) = studio.take_jobs()
         pictures.append(base64.b64decode(job()["picture"]["png"]))
     assert all(picture.startswith(b"\x89PNG") for picture in pictures)
     assert pictures[0] != pictures[1]
@@ -507,15 +506,14 @@ def test_completion_and_description(pages: Pages) -> None:
     """What can be written at a position, and what stands there, in a text beyond the first plane of characters too."""
     text = "{ \U0001f916 }\nVAR low : FRAME ;\nBEGIN\n  MOVE ARM_1 TO l\nEND.\n"
     pages.send("complete", text=text, offset=text.index("l\nEND") + 1)
-    ((_, job),) = pages.studio.jobs
-    pages.studio.jobs.clear()
+    ((_, job),) = pages.studio.take_jobs()
     (first,) = [it for it in job()["completions"] if it["label"] == "low"]
     assert text[first["start"] : first["end"]] == "l"
     assert pages.send("text", text=text, version=0) == ""
     problems = pages.state()["program"]["diagnostics"]
     assert len(text[: text.index("l\nEND")].encode("utf-16-le")) // 2 in {it["start"] for it in problems}
     pages.send("describe", offset=text.index("low"))
-    ((_, job),) = pages.studio.jobs
+    ((_, job),) = pages.studio.take_jobs()
     assert "FRAME" in job()["description"]
 
 
@@ -584,9 +582,23 @@ def test_what_is_kept_of_a_run(pages: Pages) -> None:
     for what in beginnings:
         assert pages.send("keep", what=what, arm="ARM_1") == ""
     names = set()
-    for (page, job), beginning in zip(pages.studio.jobs, beginnings.values(), strict=True):
+    for (page, job), beginning in zip(pages.studio.take_jobs(), beginnings.values(), strict=True):
         made = job()["download"]
         assert page == 1
         assert base64.b64decode(made["data"]).startswith(beginning)
         names.add(made["name"])
     assert len(names) == 3
+
+
+def test_what_cannot_be_made(pages: Pages) -> None:
+    """A message that cannot be made is refused in words, whatever went wrong; a few wait at once, and no more."""
+    pages.send("run")
+    pages.wait(6.0)
+    refusals = [pages.send("keep", what="page", arm="ARM_1") for _ in range(10)]
+    assert refusals == [""] * 8 + ["too much is being made already; wait a moment"] * 2
+    run = pages.studio.project.run
+    assert run is not None
+    run.recording = lambda: 1 / 0  # type: ignore[method-assign,assignment,return-value]
+    assert [job() for _, job in pages.studio.take_jobs()] == [None] * 8
+    assert "ZeroDivisionError" in pages.state()["refusal"]
+    assert pages.send("keep", what="page", arm="ARM_1") == ""

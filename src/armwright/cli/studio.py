@@ -13,7 +13,6 @@ from armwright.cli.options import usage_error
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
-    from armwright.cell.model import Cell
     from armwright.studio.cell_file import CellFile
 
 _EMPTY = """name = {name}
@@ -47,12 +46,12 @@ def studio(
     from armwright.studio.studio import Studio
     from armwright.studio.workbench import Workbench
 
-    shown, file = _cell(cell, new)
+    file = _cell_file(cell, new)
     if program is None and new is not None and not new.with_suffix(".rlo").exists():
         program = new.with_suffix(".rlo")
-    if program is not None and file is not None and program.resolve() == file.path.resolve():
+    if program is not None and program.resolve() == file.path.resolve():
         raise usage_error("PROGRAM", f"{program} is the cell file")
-    served = Studio(Project(Workbench(shown), file, program))
+    served = Studio(Project(Workbench(file.cell), file, program))
     try:
         serve(served, lambda address: _announce(address, open_it=open_browser), port)
     except OSError as error:
@@ -69,16 +68,15 @@ def _announce(address: str, *, open_it: bool) -> None:
         webbrowser.open(address)
 
 
-def _cell(name: str, new: Path | None) -> "tuple[Cell, CellFile | None]":
-    """Return the cell to show, and the file that frames are taught into."""
+def _cell_file(name: str, new: Path | None) -> "CellFile":
+    """Return the file of the cell to show, into which frames are taught; one of an arm alone has no name yet."""
     from armwright.arm.load import is_path, load_arm
     from armwright.files.output import write_file
     from armwright.studio.cell_file import CellFile
 
     is_cell = is_path(name) and Path(name).suffix.lower() in {".toml", ".json"} and _has_arms(Path(name))
     if is_cell and new is None:
-        file = CellFile(Path(name))
-        return file.cell, file
+        return CellFile(Path(name))
     if is_cell:
         raise usage_error("--new", f"expected an arm to begin a cell with, got the cell {name}")
     arm = load_arm(name)
@@ -88,13 +86,11 @@ def _cell(name: str, new: Path | None) -> "tuple[Cell, CellFile | None]":
     model = os.path.relpath(name, place.parent) if is_path(name) else name
     text = _EMPTY.format(name=json.dumps(place.stem.replace("_", " ")), model=json.dumps(model), start=numbers)
     if new is None:
-        file = CellFile(place, text)
-        return file.cell, file
+        return CellFile(place, text)
     if new.exists():
         raise usage_error("--new", f"{new} exists already; open it by: armwright studio {new}")
     write_file(new, text)
-    file = CellFile(new)
-    return file.cell, file
+    return CellFile(new)
 
 
 def _bent(arm: "Arm") -> "Array":

@@ -17,7 +17,6 @@ from urllib.parse import SplitResult, parse_qs, urlsplit
 
 import attrs
 
-from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
 from armwright.studio.messages import MAX_MESSAGE
 from armwright.studio.page import studio_page
@@ -171,24 +170,20 @@ class Server:
         page.may_send.set()
         if self.studio.receive(text, page.number, time.monotonic()):
             self._changed()
-        while self.studio.jobs:
-            number, job = self.studio.jobs.pop(0)
+        for number, job in self.studio.take_jobs():
             task = asyncio.create_task(self._send_answer(number, job))
             self._sending.add(task)
             task.add_done_callback(self._sending.discard)
 
-    async def _send_answer(self, number: int, job: Callable[[], dict[str, Any]]) -> None:
+    async def _send_answer(self, number: int, job: Callable[[], dict[str, Any] | None]) -> None:
         """Make a message beside all else, and send it to the page that has asked for it."""
         from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - of the extra
 
-        try:
-            made = await asyncio.get_running_loop().run_in_executor(self._jobs, job)
-        except ArmwrightError as error:
-            self.studio.refuse(number, error)
-            self._changed()
-            return
+        made = await asyncio.get_running_loop().run_in_executor(self._jobs, job)
         page = self._pages.get(number)
-        if page is not None:
+        if made is None:
+            self._changed()
+        elif page is not None:
             with contextlib.suppress(ConnectionClosed):
                 await page.socket.send(json.dumps(made))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from armwright.cell.observations import Picture
@@ -52,13 +53,14 @@ class Studio:
         workbench: the arms.
         project: the files.
         control: which page commands.
-        jobs: messages that pages have asked for, each with the number of the page; whoever serves the pages makes them.
     """
 
     def __init__(self, project: Project) -> None:
         """Take a project that no page commands yet."""
         self.project, self.workbench, self.control = project, project.workbench, Control()
-        self.jobs: list[tuple[int, Callable[[], dict[str, Any]]]] = []
+        self._jobs: list[tuple[int, Callable[[], dict[str, Any]]]] = []
+        # Of them so many have not been made yet, those included that somebody makes.
+        self._unmade = 0
         # Why the latest command of each page was not done.
         self._refusals: dict[int, str] = {}
         # What each page has of what is sent only when it changes, by its key in the state.
@@ -191,22 +193,38 @@ class Studio:
             case m.Keep():
                 self.workbench.arm(command.arm)
                 run, what, arm = project.running(), command.what, command.arm
-                self._check_jobs()
-                self.jobs.append((page, lambda: download(run.recording(), what, arm).message()))
+                self._add_job(page, lambda: download(run.recording(), what, arm).message())
             case m.Look():
-                self._check_jobs()
                 take, camera = project.camera_picture(command.camera), command.camera
-                self.jobs.append((page, lambda: _picture_message(camera, take())))
+                self._add_job(page, lambda: _picture_message(camera, take()))
             case m.Complete():
                 items = program.completions(command.text, command.offset)
-                self.jobs.append((page, lambda: {"completions": items}))
+                self._add_job(page, lambda: {"completions": items})
             case m.Describe():
                 text = program.description(command.offset)
-                self.jobs.append((page, lambda: {"description": text}))
+                self._add_job(page, lambda: {"description": text})
 
-    def _check_jobs(self) -> None:
-        if len(self.jobs) >= _MOST_JOBS:
+    def _add_job(self, page: int, job: Callable[[], dict[str, Any]]) -> None:
+        if self._unmade >= _MOST_JOBS:
             raise MessageError("too much is being made already; wait a moment")
+        self._jobs.append((page, job))
+        self._unmade += 1
+
+    def take_jobs(self) -> list[tuple[int, Callable[[], dict[str, Any] | None]]]:
+        """Return what is to be made for pages, by their numbers: each a message, or None where the page is refused."""
+        jobs, self._jobs = self._jobs, []
+        return [(page, partial(self._make, page, job)) for page, job in jobs]
+
+    def _make(self, page: int, job: Callable[[], dict[str, Any]]) -> dict[str, Any] | None:
+        try:
+            return job()
+        except ArmwrightError as error:
+            self.refuse(page, error)
+        except Exception as error:  # noqa: BLE001 - a mistake of ours does not cut off the page that it happens to
+            self.refuse(page, ArmwrightError(mistake_text(error)))
+        finally:
+            self._unmade -= 1
+        return None
 
     def _do_running(self, command: m.Command, page: int) -> None:
         project = self.project

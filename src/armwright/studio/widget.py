@@ -13,7 +13,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import ArrayLike, joint_array
 from armwright.cell.model import Cell, CellArm
-from armwright.errors import ArmwrightError, InvalidValueError, KindError, shown
+from armwright.errors import InvalidValueError, KindError, shown
 from armwright.extras import import_extra
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.kinematics.inverse_kinematics.solution import violations
@@ -164,13 +164,12 @@ class _Connection:
         self._widget.send(json.dumps(self._studio.state(_PAGE), separators=(",", ":"), allow_nan=False))
 
     def _answer(self) -> None:
-        while self._studio.jobs:
-            number, job = self._studio.jobs.pop(0)
-            try:
-                self._widget.send(json.dumps(job()))
-            except ArmwrightError as error:
-                self._studio.refuse(number, error)
+        for _, job in self._studio.take_jobs():
+            made = job()
+            if made is None:
                 self._push()
+            else:
+                self._widget.send(json.dumps(made))
 
     async def _tick(self) -> None:
         before = time.monotonic()
