@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from armwright.report.elements import Tile
+from armwright.report.limit_spans import SHORT
 
 if TYPE_CHECKING:
     from armwright.report.page import ArmRecord, RunPage, StageRow
 
-_SHORT = {"position": "pos", "speed": "speed", "acceleration": "acc", "effort": "effort"}
 # Limits that are named; others are counted.
 _NAMED = 2
 # Rounding beyond a limit is none.
@@ -93,7 +93,7 @@ def _limits(data: RunPage) -> Tile:
     shares: dict[str, float] = {}
     for arm in data.arms:
         for span in arm.at_limits:
-            name = f"{arm.name + ' ' if several else ''}{_SHORT[span.limit]} j{span.joint + 1}"
+            name = f"{arm.name + ' ' if several else ''}{SHORT[span.limit]} j{span.joint + 1}"
             shares[name] = max(span.share, shares.get(name, 0.0))
     beyond = [name for name, share in shares.items() if share > 1 + _TOLERANCE]
     names = beyond or list(shares)

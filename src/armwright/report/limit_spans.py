@@ -10,6 +10,8 @@ from armwright.arm.model import JointLimits
 from armwright.arrays import Array
 
 LimitKind = Literal["position", "speed", "acceleration", "effort"]
+# Their names where there is little room.
+SHORT: dict[LimitKind, str] = {"position": "pos", "speed": "speed", "acceleration": "acc", "effort": "effort"}
 
 # A joint is at a limit from this share of it on, which is shown as 100 %.
 _REACHED = 0.995

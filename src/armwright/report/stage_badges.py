@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator
 
-from armwright.motion.certificate import LimitName
 from armwright.program.vm.move_diagnostics import detour_course, path_text, stage_obstacle
 from armwright.program.vm.recording import RunStage
+from armwright.report.limit_spans import SHORT
 from armwright.report.page import StageBadge
-
-_SHORT: dict[LimitName, str] = {"speed": "speed", "acceleration": "acc", "effort": "effort"}
 
 
 def stage_badges(run: RunStage) -> Iterator[StageBadge]:
@@ -34,7 +32,7 @@ def stage_badges(run: RunStage) -> Iterator[StageBadge]:
         yield StageBadge(text="planned path", title=path_text(run.path))
     if certificate is not None and certificate.because is not None:
         limit, joint = certificate.because
-        text = f"{_SHORT[limit]} j{joint + 1}"
+        text = f"{SHORT[limit]} j{joint + 1}"
         yield StageBadge(text=text, title=certificate.slowed, mark="warn", factor=certificate.factor)
     elif stage.slowed and not where:
         yield StageBadge(text="slowed", title=stage.slowed, mark="warn")

@@ -64,13 +64,13 @@ def download(recording: Recording, kind: Kind, arm: str) -> Download:
     """
     if recording.duration <= 0:
         raise DownloadError("nothing has moved yet that could be kept")
+    if kind == "gif":
+        stream = next(stream for stream in recording.streams if stream.arm == arm)
+        model = recording.cell.arms[arm].arm
+        films = render_films(model, _Played(stream.t, stream.q), np.empty((0, 4, 4)))  # type: ignore[arg-type]
+        return Download("motion.gif", "image/gif", films["move.gif"])
     data = run_page_data(recording, (), "armwright studio")
     if kind == "page":
         return Download("report.html", "text/html", run_page(data).encode())
-    if kind == "gltf":
-        assert data.animation is not None  # noqa: S101 - a run has one
-        return Download("motion.glb", "model/gltf-binary", gltf_motion(data.animation))
-    stream = next(stream for stream in recording.streams if stream.arm == arm)
-    model = recording.cell.arms[arm].arm
-    films = render_films(model, _Played(stream.t, stream.q), np.empty((0, 4, 4)))  # type: ignore[arg-type]
-    return Download("motion.gif", "image/gif", films["move.gif"])
+    assert data.animation is not None  # noqa: S101 - a run has one
+    return Download("motion.glb", "model/gltf-binary", gltf_motion(data.animation))

@@ -68,12 +68,6 @@ function toolOf(arm, figure) {
   return framesAt(figure, positionsOf(arm.name, figure, locate(data.animation.t, now.t))).at(-1);
 }
 
-// Fingers whose opening [m] was measured, or is known to be a share of the largest.
-function gripText(grip, opening) {
-  if (opening) return `${number(grip * opening * MILLIMETRES, 1)} mm open`;
-  return grip > 0.99 ? "open" : grip < 0.01 ? "closed" : `${number(100 * grip, 0)} % open`;
-}
-
 function startJog() {
   byId("by-hand-end").addEventListener("click", () => seek(now.t));
 }

@@ -73,3 +73,9 @@ function quantityText(quantity, joint, value) {
 function placeText(p) {
   return p.map((value) => number(value * MILLIMETRES, 1)).join(", ");
 }
+
+// Fingers whose opening [m] was measured, or is known to be a share of the largest.
+function gripText(grip, opening = 0) {
+  if (opening) return `${number(grip * opening * MILLIMETRES, 1)} mm open`;
+  return grip > 0.99 ? "open" : grip < 0.01 ? "closed" : `${number(100 * grip, 0)} % open`;
+}

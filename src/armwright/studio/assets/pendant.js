@@ -134,7 +134,7 @@ function showPendant(state) {
   [...byId("place").querySelectorAll("input")].forEach((field, k) => {
     if (it.tool && document.activeElement !== field) field.value = number(it.tool[9 + k] * MILLIMETRES, 1).replace("−", "-");
   });
-  byId("grip-text").textContent = it.holds.length ? `holds ${it.holds.join(", ")}` : it.grip > 0.99 ? "open" : it.grip < 0.01 ? "closed" : `${number(100 * it.grip, 0)} % open`;
+  byId("grip-text").textContent = it.holds.length ? `holds ${it.holds.join(", ")}` : gripText(it.grip);
   showSolutions(it.solutions ?? []);
 }
 
