@@ -158,7 +158,6 @@ class GripperDrive:
         self.positions: npt.NDArray[np.intp] = np.array([], dtype=np.intp)
         if self._fingers:
             self.positions = np.array([model.joint(f"{name}/{side}").qposadr[0] for side in sides])
-        self._addresses: list[int] = self.positions.tolist() if self._fingers else []
         lip = () if self._fingers else range(LIP)
         self._lip = np.array([model.geom(f"{name}/lip{i}").id for i in lip], dtype=np.intp)
         self._tool, self._bodies = model.body(f"{name}/tool").id, model.geom_bodyid
@@ -220,11 +219,6 @@ class GripperDrive:
             return -1
         others = self._bodies[np.where(lips[flat, 0], pairs[flat, 1], pairs[flat, 0])]
         return int(others[0]) if (others == others[0]).all() else -1
-
-    def opening(self, data: Any) -> float:
-        """Return the distance between the fingers [m]; 0 for suction."""
-        qpos = data.qpos
-        return float(sum(qpos[position] for position in self._addresses))
 
     def copy(self) -> GripperDrive:
         """Return a drive in the same state."""

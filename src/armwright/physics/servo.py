@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
+from inspect import signature
 from typing import Any, NamedTuple, Protocol
 
 import attrs
@@ -11,14 +13,19 @@ import numpy as np
 
 from armwright.arm.drive import Motor
 from armwright.arm.model import Arm
-from armwright.arrays import Array, exact_shape
+from armwright.arrays import LARGEST, Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.drives import friction_law
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.friction import constant_efforts, dry_offsets
 from armwright.physics.plant import ArmIndices
+from armwright.tracing.emit import emit
+from armwright.tracing.kernel import Kernel
+from armwright.tracing.scalar import Scalar, larger, select, smaller
+from armwright.tracing.vectors import dot
 
+Scalars = Sequence[Scalar]
 # The integral of errors is fed back with this part of the cube of the bandwidth.
 _INTEGRAL = 0.2
 # Dry friction is compensated in full where the reference moves faster than this [rad/s, m/s].
@@ -76,23 +83,27 @@ class Sent:
         self.trajectory, self.tick = trajectory, tick
         count = math.ceil(trajectory.duration / period - _TICK_TOLERANCE) + 1
         t = np.minimum(np.arange(count) * period, trajectory.duration)
-        self._q, self._qd, self._qdd = (trajectory(t, order) for order in range(3))
+        q, qd, qdd = (trajectory(t, order) for order in range(3))
         # Then the arm stands.
-        self._qd[-1] = self._qdd[-1] = 0.0
-        self._friction = friction(self._qd)
+        qd[-1] = qdd[-1] = 0.0
+        self._rows = np.stack([q, qd, qdd, friction(qd)], axis=1)
+        self._last = count - 1
 
-    def at(self, tick: int) -> Reference:
-        """Return where the joints are sent at a tick."""
-        index = min(max(tick - self.tick, 0), len(self._q) - 1)
-        return Reference(self._q[index], self._qd[index], self._qdd[index], self._friction[index])
+    def at(self, tick: int) -> Array:
+        """Return where the joints are sent at a tick: the fields (4, n) of a ``Reference``."""
+        row: Array = self._rows[min(max(tick - self.tick, 0), self._last)]
+        return row
+
+    def positions(self, first: int, last: int) -> Array:
+        """Return where the joints are sent (k, n) at the ticks from the first one up to, but without, the last one."""
+        return np.asarray(self._rows[np.clip(np.arange(first, last) - self.tick, 0, self._last), 0])
 
     def configuration(self, time: float, period: float) -> Array:
         """Return the positions (n,) at any time from its beginning on."""
         return self.trajectory(min(max(0.0, time - self.tick * period), self.trajectory.duration))
 
 
-@attrs.define(eq=False)
-class Measured:
+class Measured(NamedTuple):
     """What the servo read and did at a tick, (n,) each.
 
     Attributes:
@@ -133,6 +144,7 @@ class ArmServo:
             law: another controller; None for that of the settings.
         """
         self.arm, self.indices, self._period, self._settings, self._law = arm, indices, period, settings, law
+        self._tick = np.array([period])
         # Compensated friction would chatter at rest with the measured speed: what is not viscous follows the reference.
         smooth = tuple(Motor(inertia=x.inertia, viscous=x.viscous, gear_ratio=x.gear_ratio) for x in arm.motors)
         self._compiled = compile_arm(attrs.evolve(arm, motors=smooth), quickly=True)
@@ -145,12 +157,13 @@ class ArmServo:
         # Whether errors are not to be integrated: against what an arm leans on the integral would grow and grow.
         self.leaning = False
         self._sums = np.zeros(arm.n)
-        self._effort = arm.limits.effort
+        effort = arm.limits.effort
         # Noise is a part of the largest efforts; there is none of those that are not known.
-        self.finite_effort = np.where(np.isfinite(self._effort), self._effort, 0.0)
+        self.finite_effort = np.where(np.isfinite(effort), effort, 0.0)
+        self._limits = np.minimum(effort, LARGEST)
         w = settings.bandwidth
-        self._kp, self._kd = w**2, 2 * w
-        self._ki = _INTEGRAL * w**3 if settings.integral else 0.0
+        self._gains = np.array([w**2, 2 * w, _INTEGRAL * w**3 if settings.integral else 0.0])
+        self._commanded, self._limited, self._carrying = (_kernel(it, arm.n) for it in (_command, _limit, _carry))
         self._sensors = sensors
         turns = np.array([2 * math.pi if joint.revolute else 1.0 for joint in arm.joints])
         # An encoder is on the motor, before the gear.
@@ -164,29 +177,45 @@ class ArmServo:
         """Begin at rest in a new world."""
         data.qfrc_applied[self.indices.speeds] = self._offsets
 
-    def drive(self, data: Any, t: float, reference: Reference) -> Measured:
-        """Read the sensors, and command the motors until the next tick."""
-        actual = data.qpos[self.indices.positions]
-        q, qd = self._read(actual, data)
+    @property
+    def reads_exactly(self) -> bool:
+        """Whether positions, speeds and efforts are read as they are."""
+        return self._sensors.exact and not self._sensors.effort_noise
+
+    def drive(self, data: Any, t: float, reference: Array) -> tuple[Array, Array, Array]:
+        """Read the sensors, and command the motors until the next tick.
+
+        Args:
+            data: of the world.
+            t: time [s].
+            reference: where the joints are sent: the fields (4, n) of a ``Reference``.
+
+        Returns:
+            Positions and speeds (n,) as the sensors read them, and the efforts (n,) of the motors.
+        """
+        q, qd = self._read(data.qpos[self.indices.positions], data)
         if self._law is not None:
-            tau = self._own_efforts(self._law, t, q, qd, reference)
+            tau = np.clip(self._own_efforts(self._law, t, q, qd, Reference(*reference)), -self._limits, self._limits)
         else:
-            error = reference.q - q
-            correction = self._kd * (reference.qd - qd) + self._kp * error + self._ki * self._sums
+            qdd, errors = self._commanded(q, qd, reference, self._sums, self._gains)
             if self._settings.law == "pd":
                 # The weight is taken off, and errors are corrected as if each joint moved its own inertia.
-                tau = self._compiled.gravity_efforts(q) + self._compiled.mass_matrix(q).diagonal() * correction
+                correction = self._compiled.mass_matrix(q).diagonal() * (qdd - reference[2])
+                tau = self._compiled.gravity_efforts(q) + correction
             else:
-                tau = self._compiled.inverse_dynamics(q, qd, reference.qdd + correction)
+                tau = self._compiled.inverse_dynamics(q, qd, qdd)
                 if self.load:
-                    tau = tau + self._load_efforts(q, reference.qdd + correction)
-            tau = tau + reference.friction
-            # What a motor cannot give is not to be asked for twice.
+                    # What a part in the hand asks for; its centripetal acceleration is left out.
+                    tau = self._carrying(tau, self._compiled.jacobian(q), qdd, self._load())
+            tau, sums = self._limited(tau, reference, self._limits, self._sums, errors, self._tick)
             if not self.leaning:
-                self._sums += error * self._period * (np.abs(tau) < self._effort)
-        tau = np.minimum(np.maximum(tau, -self._effort), self._effort)
+                self._sums = sums
         data.ctrl[self.indices.motors] = tau
-        return Measured(q, qd, tau, actual)
+        return q, qd, tau
+
+    def _load(self) -> Array:
+        """Return the mass in the hand [kg] and the gravity (3,) on it."""
+        return np.array([self.load, *self.arm.gravity])
 
     def _own_efforts(self, law: TorqueLaw, t: float, q: Array, qd: Array, reference: Reference) -> Array:
         """Return the efforts (n,) of a user's law.
@@ -212,11 +241,6 @@ class ArmServo:
             return np.array(data.qpos[self.indices.positions])
         return self._latest().copy()
 
-    def _load_efforts(self, q: Array, qdd: Array) -> Array:
-        """Return what a part in the hand asks for beside the arm (n,); its centripetal acceleration is left out."""
-        J = self._compiled.jacobian(q)[:3]
-        return np.asarray(J.T @ (self.load * (J @ qdd - self.arm.gravity)))
-
     def _read(self, q: Array, data: Any) -> tuple[Array, Array]:
         """Return positions and speeds as the controller knows them."""
         if self._sensors.exact:
@@ -238,5 +262,45 @@ class ArmServo:
         """Return a servo in the same state."""
         other = object.__new__(ArmServo)
         other.__dict__.update(self.__dict__)
-        other._sums, other._speed = self._sums.copy(), self._speed.copy()
+        # Sums are replaced, speeds are added to.
+        other._speed = self._speed.copy()
         return other
+
+
+@cache
+def _kernel(equation: Callable[..., list[list[Scalar]]], n: int) -> Callable[..., Any]:
+    """Return the kernel of an equation below for arms of n joints."""
+    sizes: dict[str, int | tuple[int, ...]] = {"q": n, "qd": n, "qdd": n, "tau": n, "errors": n, "sums": n, "limits": n}
+    sizes |= {"reference": (4, n), "J": (6, n), "gains": 3, "load": 4, "period": 1}
+    names = signature(equation).parameters
+    emitted = emit(
+        equation.__name__, equation, {name: sizes[name] for name in names}, origin=f"{__name__} {equation.__name__} {n}"
+    )
+    return Kernel(emitted=emitted, quickly=True).function(equation.__name__)
+
+
+def _command(q: Scalars, qd: Scalars, reference: Scalars, sums: Scalars, gains: Scalars) -> list[list[Scalar]]:
+    """Return the accelerations that the joints are to have, and the errors of their positions."""
+    n, (kp, kd, ki) = len(q), gains
+    errors = [reference[i] - q[i] for i in range(n)]
+    feedback = [kd * (reference[n + i] - qd[i]) + kp * errors[i] + ki * sums[i] for i in range(n)]
+    return [[reference[2 * n + i] + feedback[i] for i in range(n)], errors]
+
+
+def _limit(  # noqa: PLR0917 - of one kernel
+    tau: Scalars, reference: Scalars, limits: Scalars, sums: Scalars, errors: Scalars, period: Scalars
+) -> list[list[Scalar]]:
+    """Return what the motors give of efforts without friction, and the sums of errors after the tick."""
+    efforts = [x + friction for x, friction in zip(tau, reference[3 * len(tau) :], strict=True)]
+    limited = [larger(smaller(x, limit), -limit) for x, limit in zip(efforts, limits, strict=True)]
+    # What a motor cannot give is not to be asked for twice.
+    grown = [x + error * period[0] for x, error in zip(sums, errors, strict=True)]
+    return [limited, [select(abs(x) < it, y, z) for x, it, y, z in zip(efforts, limits, grown, sums, strict=True)]]
+
+
+def _carry(tau: Scalars, J: Scalars, qdd: Scalars, load: Scalars) -> list[list[Scalar]]:
+    """Return efforts and what a mass at the tool point asks for beside them."""
+    n, (mass, *gravity) = len(tau), load
+    rows = [J[n * k : n * k + n] for k in range(3)]
+    force = [mass * (dot(row, qdd) - g) for row, g in zip(rows, gravity, strict=True)]
+    return [[tau[i] + dot([row[i] for row in rows], force) for i in range(n)]]

@@ -219,7 +219,7 @@ class Watch:
     def _check_track(self, data: Any, tick: int, arm: str, sent: Sent) -> Mishap | None:
         """See whether an arm is where it was sent."""
         hand, limits, period = self.hands[arm], self._tracking[arm], self._cell.period
-        error = np.abs(sent.at(tick).q - data.qpos[self._positions[arm]])
+        error = np.abs(sent.at(tick)[0] - data.qpos[self._positions[arm]])
         before, hand.off_track = hand.off_track, hand.off_track + self._every if (error > limits).any() else 0
         if not before < _OFF_TRACK / period <= hand.off_track:
             return None

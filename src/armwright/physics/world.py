@@ -106,7 +106,10 @@ class PhysicsCell:
             self._watch.hands[name].drive.start(self._data)
             self._sent[name] = Sent(hold(arm.start, 0.0), 0, period, self._servos[name].friction)
         self._tick = 0
-        self._log = Log(cell, self._world)
+        fingers = {name: hand.drive.positions for name, hand in self._watch.hands.items()}
+        self._log = Log(cell, self._world, self._servos, fingers)
+        for name, sent in self._sent.items():
+            self._log.send(name, 0, sent)
         self._pictures: tuple[Picture, ...] = ()
         self._mishaps: tuple[Mishap, ...] = ()
         # Made for the first picture, and shared by copies.
@@ -164,23 +167,25 @@ class PhysicsCell:
 
     def _step(self) -> Mishap | None:
         """Let one period of the servo go by; return that this cannot be, if numbers without meaning come to a servo."""
-        data = self._data
+        data, now = self._data, self.now
         for name, servo in self._servos.items():
-            reference, drive = self._sent[name].at(self._tick), self._watch.hands[name].drive
-            servo.load, servo.leaning = self._watch.known_load(name), self._watch.hands[name].guarded
+            hand = self._watch.hands[name]
+            servo.load, servo.leaning = self._watch.known_load(name), hand.guarded
             try:
-                measured = servo.drive(data, self.now, reference)
+                q, qd, tau = servo.drive(data, now, self._sent[name].at(self._tick))
             except InvalidValueError:
                 if np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all():
                     raise
                 # Time goes by, but nothing happens any more.
                 self._tick += 1
                 return mishaps.unstable(self.now)
-            drive.step(data)
-            noise = self._cell.arms[name].sensors.effort_noise
-            if noise:
-                measured.tau = measured.tau + noise * servo.finite_effort * self._rng.normal(size=len(measured.tau))
-            self._log.add(name, self._tick, reference, measured, drive.opening(data))
+            hand.drive.step(data)
+            if not servo.reads_exactly:
+                noise = self._cell.arms[name].sensors.effort_noise
+                if noise:
+                    tau = tau + noise * servo.finite_effort * self._rng.normal(size=len(tau))
+                self._log.add_reading(name, self._tick, q, qd, tau)
+        self._log.add(self._tick, data)
         self._world.step(data)
         # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
@@ -204,6 +209,7 @@ class PhysicsCell:
         self._believed.start_motion(arm, trajectory, now, tip, guarded=guarded)
         friction = self._servos[arm].friction
         self._sent[arm] = Sent(trajectory, round(now / self._cell.period), self._cell.period, friction)
+        self._log.send(arm, self._tick, self._sent[arm])
         self._watch.start_motion(arm, self._tick, guarded=guarded)
 
     def contact_time(self, arm: str) -> None:
