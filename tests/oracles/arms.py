@@ -3,7 +3,8 @@
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor, Spring
+from armwright.arm.limits import Limits
+from armwright.arm.model import Arm, Joint, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector

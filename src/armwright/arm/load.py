@@ -11,7 +11,8 @@ import numpy as np
 from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message

@@ -15,10 +15,11 @@ import attrs
 import numpy as np
 
 from armwright.arm.drive import Motor, Spring
+from armwright.arm.limits import Limits
 from armwright.arm.mjcf.couplings import couplings
 from armwright.arm.mjcf.drives import limits_of, motor_of, spring_of
 from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
-from armwright.arm.model import Limits, Link
+from armwright.arm.model import Link
 from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, one_of

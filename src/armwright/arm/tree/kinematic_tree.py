@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import NamedTuple, Protocol, TypeAlias
 
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import Link
 from armwright.arrays import Array, number
 from armwright.errors import FileFormatError, InvalidValueError, KindError, listed, shown
 from armwright.spatial.shapes import Solid

@@ -11,7 +11,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import Link
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.tree.kinematic_tree import Mimic, check_lock, quoted
 from armwright.arm.urdf.elements import Element, origin_of, read_elements

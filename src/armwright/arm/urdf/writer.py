@@ -14,8 +14,9 @@ import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs
 from armwright.arm.drive import Motor
+from armwright.arm.limits import Limits
 from armwright.arm.losses import lost_beside_joints, lost_of_joint, mean_dry_friction
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Link
 from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.arm.urdf.geometry import primitives
