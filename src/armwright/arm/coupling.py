@@ -41,7 +41,7 @@ def _limits(value: Iterable[Limits]) -> tuple[Limits, ...]:
     for i, each in enumerate(limits, 1):
         if not isinstance(each, Limits):
             raise KindError(f"coupling: expected limits to be Limits, got {shown(each)} for drive {i}")
-    return limits
+    return limits if any(each != Limits() for each in limits) else ()
 
 
 @attrs.frozen(kw_only=True)

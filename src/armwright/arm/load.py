@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from armwright.arm.collision_pairs import collision_pairs_in
+from armwright.arm.coupling import Coupling
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.drive import Motor, Spring
 from armwright.arm.limits import Limits
@@ -84,11 +85,13 @@ def read_arm(path: Path | str) -> Arm:
     top = Document.read(path).root
     convention = top.choice("convention", ("standard", "modified"), default="standard")
     tables = top.tables("joint", "joints")
-    joints, links, motors = [], [], []
+    joints, links, motors, drive_limits = [], [], [], []
     for table in tables:
         joints.append(_joint(table))
         links.append(_link(table.table("link")))
-        motors.append(_motor(table.table("motor"), joints[-1].revolute))
+        motor = table.table("motor")
+        drive_limits.append(_limits(motor.table("limits"), joints[-1].kind) if "limits" in motor else None)
+        motors.append(_motor(motor, joints[-1].revolute))
         table.refuse_unknown_keys()
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
     if convention == "modified":
@@ -103,6 +106,7 @@ def read_arm(path: Path | str) -> Arm:
         joints=joints,
         links=links,
         motors=motors,
+        coupling=_coupling(top.table("coupling"), drive_limits),
         base=base,
         tool=tool,
         gravity=gravity.vector("m_per_s2", 3, default=UPRIGHT_GRAVITY),
@@ -150,11 +154,25 @@ def _uncertainty(table: Table) -> Uncertainty | None:
 
 def _joint(table: Table) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic"))
-    limits = table.table("limits")
     table.allow("fixed")
     units = ANGLE if kind == "revolute" else LENGTH
-    effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
     spring = table.table("spring")
+    return Joint(
+        kind="revolute" if kind == "revolute" else "prismatic",
+        theta=number_in(table, "theta", ANGLE, default=0.0),
+        d=number_in(table, "d", LENGTH, default=0.0),
+        a=number_in(table, "a", LENGTH, default=0.0),
+        alpha=number_in(table, "alpha", ANGLE, default=0.0),
+        fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
+        limits=_limits(table.table("limits"), kind),
+        spring=_spring(spring, units),
+        name=table.text("name", default=""),
+    )
+
+
+def _limits(limits: Table, kind: str) -> Limits:
+    """Read what a joint, or its drive, may do."""
+    units, effort = (ANGLE, {"Nm": 1.0}) if kind == "revolute" else (LENGTH, {"N": 1.0})
     values = {
         "lower": number_in(limits, "lower", units, default=-math.inf),
         "upper": number_in(limits, "upper", units, default=math.inf),
@@ -174,17 +192,25 @@ def _joint(table: Table) -> Joint:
                 f"too far from zero: {limit_message('revolutions', _written(kind, values[name]))}; for a joint without "
                 "limits omit it",
             )
-    return Joint(
-        kind="revolute" if kind == "revolute" else "prismatic",
-        theta=number_in(table, "theta", ANGLE, default=0.0),
-        d=number_in(table, "d", LENGTH, default=0.0),
-        a=number_in(table, "a", LENGTH, default=0.0),
-        alpha=number_in(table, "alpha", ANGLE, default=0.0),
-        fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
-        limits=Limits(**values),
-        spring=_spring(spring, units),
-        name=table.text("name", default=""),
-    )
+    return Limits(**values)
+
+
+def _coupling(table: Table, drive_limits: Sequence[Limits | None]) -> Coupling | None:
+    """Read how the drives move the joints, whose drives have these limits, None where their file has none."""
+    n = len(drive_limits)
+    limits = [each or Limits() for each in drive_limits] if any(drive_limits) else []
+    table.allow("matrix")
+    if "matrix" not in table:
+        table.refuse_unknown_keys()
+        return Coupling(matrix=np.eye(n), limits=limits) if limits else None
+    rows = table.vectors("matrix", n)
+    table.refuse_unknown_keys()
+    if len(rows) != n:
+        raise table.error("matrix", f"expected {n} rows, one for each joint, got {len(rows)}")
+    try:
+        return Coupling(matrix=np.array(rows), limits=limits)
+    except (InvalidValueError, ShapeError) as error:
+        raise table.error("matrix", str(error).removeprefix("coupling: ")) from error
 
 
 def _link(table: Table) -> Link:
