@@ -326,6 +326,18 @@ class Arm:
         return JointLimits(**dict(zip(attrs.fields_dict(Limits), values, strict=True)))
 
     @cached_property
+    def all_limits(self) -> JointLimits:
+        """The limits of all joints, and behind them of all drives where coupled drives have limits of their own.
+
+        Each is (n,) or (2 n,); number k belongs to joint k % n or its drive.
+        """
+        if self.coupling is None or not self.coupling.limits:
+            return self.limits
+        own, of_drives = self.limits, self.coupling.drive_limits
+        names = attrs.fields_dict(JointLimits)
+        return JointLimits(**{x: np.concatenate([getattr(own, x), getattr(of_drives, x)]) for x in names})
+
+    @cached_property
     def revolute(self) -> Flags:
         """Which joints rotate, (n,)."""
         return read_only(np.array([joint.revolute for joint in self.joints]))

@@ -179,11 +179,18 @@ def coulomb_friction(arm: Arm, qd: Array) -> Array:
     Returns:
         (..., n) the efforts that overcome it [N m] or [N], positive in the direction of q.
     """
-    law = friction_law(arm)._replace(stribeck=None)
-    if arm.coupling is None:
-        return np.asarray(law.dry(qd, qd))
-    md = arm.coupling.drives(qd)
-    return arm.coupling.joint_efforts(np.asarray(law.dry(md, md)))
+    speeds = drive_speeds(arm, qd)
+    return efforts_at_joints(arm, np.asarray(friction_law(arm)._replace(stribeck=None).dry(speeds, speeds)))
+
+
+def drive_speeds(arm: Arm, qd: Array) -> Array:
+    """Return the speeds (..., n) of the drives, from those of the joints."""
+    return qd if arm.coupling is None else arm.coupling.drives(qd)
+
+
+def efforts_at_joints(arm: Arm, efforts: Array) -> Array:
+    """Return efforts (..., n) at the drives as the joints see them."""
+    return efforts if arm.coupling is None else arm.coupling.joint_efforts(efforts)
 
 
 class _Drive(NamedTuple):
