@@ -12,8 +12,9 @@ import numpy as np
 
 from armwright.arm.coupling import Coupling
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import LARGEST, Array
 from armwright.kinematics.inverse_kinematics.solution import Violation, violations_of_all
+from armwright.motion.controlled_stop import brake
 from armwright.motion.trajectory import Trajectory
 
 
@@ -34,6 +35,17 @@ def limited_motion(arm: Arm, trajectory: Trajectory) -> Trajectory:
     if _with_limits(arm) is None:
         return trajectory
     return attrs.evolve(trajectory, coefficients=limited_positions(arm, trajectory.coefficients))
+
+
+def braked(arm: Arm, running: Trajectory, t: float, *, period: float) -> Trajectory:
+    """Return the motion that stops an arm along its path within its limits of acceleration: see ``brake``."""
+    if _with_limits(arm) is None:
+        return brake(running, t, arm.limits.acceleration, period=period)
+    limits = arm.all_limits.acceleration
+    # A drive whose acceleration has no limit brakes as its joints do.
+    limits = np.where(np.isfinite(limits) | (np.arange(len(limits)) < arm.n), limits, LARGEST)
+    stop = brake(limited_motion(arm, running), t, limits, period=period)
+    return attrs.evolve(stop, coefficients=stop.coefficients[:, :, : arm.n])
 
 
 def passed_limits(arm: Arm, trajectory: Trajectory) -> Iterator[Violation]:

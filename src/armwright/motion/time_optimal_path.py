@@ -180,7 +180,7 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
         raise InvalidValueError(f"path: {fault}")
     counting = LIMITS if efforts else LIMITS[:2]
     limited = np.any([np.isfinite(getattr(arm.all_limits, name)) for name in counting if name != "speed"], axis=0)
-    if len(limited) > arm.n:  # a limit of a drive is one of all joints that it moves
+    if arm.coupling is not None and len(limited) > arm.n:  # a limit of a drive is one of all joints that it moves
         limited = limited[: arm.n] | (limited[arm.n :, None] & (arm.coupling.inverse != 0)).any(axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise IncapableArmError(
