@@ -304,18 +304,18 @@ def _after(h: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> tuple[Arra
 
 def _check_drives(task: _Task, motion: Trajectory) -> None:
     """Refuse a motion that passes a limit of coupled drives: here each joint is timed by its own limits alone."""
-    arm, (n, limits) = task.arm, (task.arm.n, task.arm.all_limits)
+    arm, n, limits = task.arm, task.arm.n, task.arm.all_limits
+    if len(limits.speed) == n:
+        return
     of_drives = limited_motion(arm, motion)
-    rates = (
-        ("accelerate by", "s²", of_drives.peaks(2), limits.acceleration),
-        ("move at", "s", of_drives.peaks(1), limits.speed),
-    )
+    accelerations, speeds = of_drives.peaks(2), of_drives.peaks(1)
+    rates = ("accelerate by", "s²", accelerations, limits.acceleration), ("move at", "s", speeds, limits.speed)
     for does, per, peaks, most in rates:
         for k in np.flatnonzero(peaks[n:] > most[n:] * (1 + _AT_LIMIT)).tolist():
             beyond = _beyond_limit(arm, k, per, peaks[n + k], most[n + k])
             raise OnlineError(
                 f"on its motion to the new goal {limited_label(arm, n + k)} of '{arm.name}' would {does} {beyond}: "
-                "joints are timed one by one here; use lower limits of the joints that move it"
+                "joints are timed one by one here; use lower limits of the joints that it moves"
             )
     for fault in passed_limits(arm, motion):
         if fault.drive:

@@ -155,7 +155,7 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
         own = motor if i - 1 in at_joints else Motor()
         added = _add_joint(body, f"{name}/joint{i}", joint, own, inverse(frames[i]) @ frames[i - 1])
         if arm.coupling is None:
-            _add_motor(spec, f"{name}/motor{i}", f"{name}/joint{i}", joint.limits.effort)
+            _add_motor(spec, f"{name}/motor{i}", added, joint.limits.effort)
         elif np.isfinite(joint.limits.effort):
             added.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
             added.actfrcrange = (-joint.limits.effort, joint.limits.effort)
@@ -181,30 +181,29 @@ def drives_at_joints(arm: Arm) -> frozenset[int]:
 
 
 def _add_drives(spec: Any, name: str, arm: Arm, coupling: Coupling) -> None:
-    """Add the motors of coupled drives, and a tendon for each drive that does not move as its joint does."""
+    """Add the motors of coupled drives, and a tendon for each drive that needs one."""
     mujoco = load_mujoco()
-    at_joints = drives_at_joints(arm)
+    at_joints, own = drives_at_joints(arm), coupling.drive_limits
     for i, (motor, weights) in enumerate(zip(arm.motors, coupling.inverse, strict=True)):
-        own, target = coupling.drive_limits, f"{name}/joint{i + 1}"
-        ends = np.array((own.lower[i], own.upper[i]))
+        pulled, ends = spec.joint(f"{name}/joint{i + 1}"), np.array((own.lower[i], own.upper[i]))
         if i not in at_joints or np.isfinite(ends).any():
             tendon = spec.add_tendon(name=f"{name}/drive{i + 1}")
             for j in np.flatnonzero(weights).tolist():
                 tendon.wrap_joint(f"{name}/joint{j + 1}", float(weights[j]))
             if i not in at_joints:
-                target, tendon.armature = tendon.name, motor.inertia
+                pulled, tendon.armature = tendon, motor.inertia
                 tendon.damping, tendon.frictionloss = [motor.viscous, 0.0, 0.0], mean_dry_friction(motor)
             if np.isfinite(ends).any():
                 tendon.limited, tendon.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.clip(ends, -NO_LIMIT, NO_LIMIT)
-        _add_motor(spec, f"{name}/motor{i + 1}", target, float(own.effort[i]))
+        _add_motor(spec, f"{name}/motor{i + 1}", pulled, float(own.effort[i]))
 
 
-def _add_motor(spec: Any, name: str, target: str, effort: float) -> None:
+def _add_motor(spec: Any, name: str, pulled: Any, effort: float) -> None:
     """Add the motor of a joint or a tendon, with its largest effort."""
     mujoco = load_mujoco()
     kinds = mujoco.mjtTrn
-    kind = kinds.mjTRN_TENDON if "/drive" in target else kinds.mjTRN_JOINT
-    motor = spec.add_actuator(name=name, target=target, trntype=kind)
+    kind = kinds.mjTRN_JOINT if isinstance(pulled, mujoco.MjsJoint) else kinds.mjTRN_TENDON
+    motor = spec.add_actuator(name=name, target=pulled.name, trntype=kind)
     motor.set_to_motor()
     if np.isfinite(effort):
         motor.forcelimited, motor.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, (-effort, effort)
