@@ -69,6 +69,11 @@ class Coupling:
         n = len(self.matrix)
         if self.limits and len(self.limits) != n:
             raise ShapeError(f"coupling: expected limits for all {n} drives or for none, got {len(self.limits)}")
+        if self.limits and np.array_equal(self.matrix, np.eye(n)):
+            raise InvalidValueError(
+                "coupling: each drive moves its own joint alone, so that its limits are those of the joint; specify "
+                "them there"
+            )
         scaled = self.matrix
         for axis in (1, 0):
             lengths = np.linalg.norm(scaled, axis=axis, keepdims=True)

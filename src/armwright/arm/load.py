@@ -90,7 +90,7 @@ def read_arm(path: Path | str) -> Arm:
         joints.append(_joint(table))
         links.append(_link(table.table("link")))
         motor = table.table("motor")
-        drive_limits.append(_limits(motor.table("limits"), joints[-1].kind) if "limits" in motor else None)
+        drive_limits.append(_drive_limits(motor, joints[-1].kind, coupled="matrix" in top.table("coupling")))
         motors.append(_motor(motor, joints[-1].revolute))
         table.refuse_unknown_keys()
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
@@ -195,14 +195,24 @@ def _limits(limits: Table, kind: str) -> Limits:
     return Limits(**values)
 
 
+def _drive_limits(motor: Table, kind: str, *, coupled: bool) -> Limits | None:
+    """Read what a drive may do; None where nothing is said."""
+    if "limits" not in motor:
+        return None
+    if not coupled:
+        message = "the drive moves its joint alone; specify [joint.limits], or how the drives are coupled: [coupling]"
+        raise motor.error("limits", message)
+    return _limits(motor.table("limits"), kind)
+
+
 def _coupling(table: Table, drive_limits: Sequence[Limits | None]) -> Coupling | None:
     """Read how the drives move the joints, whose drives have these limits, None where their file has none."""
     n = len(drive_limits)
-    limits = [each or Limits() for each in drive_limits] if any(drive_limits) else []
     table.allow("matrix")
     if "matrix" not in table:
         table.refuse_unknown_keys()
-        return Coupling(matrix=np.eye(n), limits=limits) if limits else None
+        return None
+    limits = [each or Limits() for each in drive_limits]
     rows = table.vectors("matrix", n)
     table.refuse_unknown_keys()
     if len(rows) != n:

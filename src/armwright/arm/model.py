@@ -222,8 +222,7 @@ def _coupling(value: Coupling | None) -> Coupling | None:
     """Return what couples the drives; None where each moves its own joint alone, as if nothing were said."""
     if not isinstance(value, Coupling):
         return value
-    identity = np.array_equal(value.matrix, np.eye(len(value.matrix)))
-    return None if identity and not value.limits else value
+    return None if np.array_equal(value.matrix, np.eye(len(value.matrix))) else value
 
 
 def _of_its_joints(arm: Arm, _: attrs.Attribute[Any], value: Coupling | None) -> None:

@@ -67,7 +67,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     if arm.gravity_from == "stated" or not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         yield from _table("gravity", {"m_per_s2": arm.gravity})
     yield from _collisions(arm)
-    if arm.coupling is not None and not np.array_equal(arm.coupling.matrix, np.eye(arm.n)):
+    if arm.coupling is not None:
         yield from _coupling(arm.coupling)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
