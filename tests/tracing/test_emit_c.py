@@ -153,7 +153,7 @@ def test_friction_of_all_kinds(name: str, joints: int, tmp_path: Path, sample: S
 
 @pytest.mark.parametrize("name", LANGUAGES)
 @pytest.mark.parametrize("joints", [4, 20])
-@pytest.mark.drawn(0.25)
+@pytest.mark.drawn(0.15)
 def test_coupled_drives(name: str, joints: int, tmp_path: Path, sample: Sample) -> None:
     """Drives that move several joints have the bits of the processor, in arms of which loops stay loops, too."""
     rng = np.random.default_rng(sample.seed)

@@ -18,6 +18,7 @@ from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, uni
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
+from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path
@@ -85,12 +86,15 @@ def read_arm(path: Path | str) -> Arm:
     top = Document.read(path).root
     convention = top.choice("convention", ("standard", "modified"), default="standard")
     tables = top.tables("joint", "joints")
+    coupled, coupling = "coupling" in top, top.table("coupling")
+    rows = coupling.vectors("matrix", len(tables)) if coupled else []
+    coupling.refuse_unknown_keys()
     joints, links, motors, drive_limits = [], [], [], []
     for table in tables:
         joints.append(_joint(table))
         links.append(_link(table.table("link")))
         motor = table.table("motor")
-        drive_limits.append(_drive_limits(motor, joints[-1].kind, coupled="matrix" in top.table("coupling")))
+        drive_limits.append(_drive_limits(motor, joints[-1].kind, coupled=coupled))
         motors.append(_motor(motor, joints[-1].revolute))
         table.refuse_unknown_keys()
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
@@ -106,7 +110,7 @@ def read_arm(path: Path | str) -> Arm:
         joints=joints,
         links=links,
         motors=motors,
-        coupling=_coupling(top.table("coupling"), drive_limits),
+        coupling=_coupling(coupling, rows, drive_limits) if coupled else None,
         base=base,
         tool=tool,
         gravity=gravity.vector("m_per_s2", 3, default=UPRIGHT_GRAVITY),
@@ -205,20 +209,12 @@ def _drive_limits(motor: Table, kind: str, *, coupled: bool) -> Limits | None:
     return _limits(motor.table("limits"), kind)
 
 
-def _coupling(table: Table, drive_limits: Sequence[Limits | None]) -> Coupling | None:
-    """Read how the drives move the joints, whose drives have these limits, None where their file has none."""
-    n = len(drive_limits)
-    table.allow("matrix")
-    if "matrix" not in table:
-        table.refuse_unknown_keys()
-        return None
-    limits = [each or Limits() for each in drive_limits]
-    rows = table.vectors("matrix", n)
-    table.refuse_unknown_keys()
-    if len(rows) != n:
-        raise table.error("matrix", f"expected {n} rows, one for each joint, got {len(rows)}")
+def _coupling(table: Table, rows: Sequence[Array], drive_limits: Sequence[Limits | None]) -> Coupling:
+    """Return how the drives move the joints, by the rows of the matrix; limits are None where the file has none."""
+    if len(rows) != len(drive_limits):
+        raise table.error("matrix", f"expected {len(drive_limits)} rows, one for each joint, got {len(rows)}")
     try:
-        return Coupling(matrix=np.array(rows), limits=limits)
+        return Coupling(matrix=np.array(rows), limits=[each or Limits() for each in drive_limits])
     except (InvalidValueError, ShapeError) as error:
         raise table.error("matrix", str(error).removeprefix("coupling: ")) from error
 

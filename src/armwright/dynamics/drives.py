@@ -111,17 +111,20 @@ def with_drives(arm: Arm, efforts: Scalars, qd: Scalars, qdd: Scalars) -> list[S
     """Return efforts and what the drives themselves require beside them: rotor inertia and friction."""
     if arm.coupling is None:
         return scan(_with_drive, (), _drives(arm), efforts, qd, qdd)[1]
-    own = scan(_own_effort, (), _drives(arm), drive_rates(arm, qd), drive_rates(arm, qdd))[1]
-    return add(efforts, drives_at_joints(arm, own))
+    return add(efforts, _own_at_joints(arm, qd, qdd))
 
 
 def less_friction(arm: Arm, qd: Scalars, tau: Scalars) -> list[Scalar]:
     """Return the efforts less the friction of the moving drives."""
     if arm.coupling is None:
         return scan(_less_friction, (), _drives(arm), qd, tau)[1]
-    at_rest = [0.0] * arm.n
-    friction = scan(_own_effort, (), _drives(arm), drive_rates(arm, qd), at_rest)[1]
-    return subtract(tau, drives_at_joints(arm, friction))
+    return subtract(tau, _own_at_joints(arm, qd, [0.0] * arm.n))
+
+
+def _own_at_joints(arm: Arm, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+    """Return what coupled drives require by themselves, as the joints see it."""
+    states = zip(_drives(arm), drive_rates(arm, qd), drive_rates(arm, qdd), strict=True)
+    return drives_at_joints(arm, [_own_effort(*state) for state in states])
 
 
 def with_rotors(arm: Arm, M: Matrix) -> Matrix:
@@ -204,15 +207,15 @@ def _drives(arm: Arm) -> list[_Drive]:
     return [_Drive(motor.inertia, joint_friction_law(motor)) for motor in arm.motors]
 
 
-def _own_effort(_: tuple[()], drive: _Drive, velocity: Scalar, acceleration: Scalar) -> tuple[tuple[()], Scalar]:
+def _own_effort(drive: _Drive, velocity: Scalar, acceleration: Scalar) -> Scalar:
     inertial, viscous = drive.inertia * acceleration, drive.friction.viscous * velocity
-    return (), inertial + viscous + drive.friction.beyond_viscous(velocity, velocity)
+    return inertial + viscous + drive.friction.beyond_viscous(velocity, velocity)
 
 
 def _with_drive(
     _: tuple[()], drive: _Drive, effort: Scalar, velocity: Scalar, acceleration: Scalar
 ) -> tuple[tuple[()], Scalar]:
-    return (), effort + _own_effort((), drive, velocity, acceleration)[1]
+    return (), effort + _own_effort(drive, velocity, acceleration)
 
 
 def _less_friction(_: tuple[()], drive: _Drive, velocity: Scalar, effort: Scalar) -> tuple[tuple[()], Scalar]:
