@@ -41,8 +41,8 @@ def near(found: Array, expected: Array, tolerance: float = AGREEMENT) -> None:
 def test_remotely_driven_elbow(rng: np.random.Generator) -> None:
     """A planar arm whose elbow is driven by a belt from the base, in the angles of its links to the ground.
 
-    Source: Spong, Hutchinson & Vidyasagar (2006), section 7.3.2 on the planar elbow manipulator with remotely driven
-    link, equations (7.85) to (7.90); with rotors beside.
+    Source: Spong, Hutchinson & Vidyasagar (2006), chapter 7, on the planar elbow manipulator with remotely driven link;
+    with rotors beside.
     """
     m1, m2, l1, lc1, lc2, I1, I2, J1, J2 = rng.uniform(0.2, 2.0, size=9)
     l2 = 0.7

@@ -56,7 +56,7 @@ class Coupling:
         limits: what each drive may do, beside what the joints may; one for each drive, or none at all.
 
     Source:
-        Craig (2005), section 8.4, actuator Jacobians; Siciliano et al. (2009), section 8.2.2.
+        Spong, Hutchinson & Vidyasagar (2006), chapter 7, on the planar elbow manipulator with remotely driven link.
     """
 
     matrix: Array = attrs.field(converter=_matrix, eq=array_key)
