@@ -9,6 +9,7 @@ from armwright.dynamics import inverse_dynamics
 from armwright.errors import UnsupportedArmError
 from armwright.motion.quintic_polynomials import quintic
 from armwright.simulation import computed_torque, simulate
+from armwright.simulation.result import Brake
 from oracles.arms import coupled, random_arm
 from samples import Sample
 from simulation.machines import balanced
@@ -66,3 +67,14 @@ def test_what_is_refused(motor: dict[str, float], limits: list[Limits], message:
         simulate(arm, np.zeros(2), duration=0.1)
 
     assert "armwright run --physics" in str(caught.value)
+
+
+def test_brakes(rng: np.random.Generator) -> None:
+    """A brake holds a drive, which is no joint where drives are coupled; elsewhere it holds."""
+    arm = attrs.evolve(smooth(rng, 3), coupling=Coupling(matrix=[[1, 0, 0], [0, 1, 0], [0, -1, 1]]))
+
+    run = simulate(arm, np.zeros(3), brakes=[Brake(joint=0)], duration=0.1)
+    assert np.abs(run.q[:, 0]).max() == 0
+    assert np.abs(run.q[:, 1:]).max() > 0
+    with pytest.raises(UnsupportedArmError, match="the drive of joint 2 is coupled, so that a brake would"):
+        simulate(arm, np.zeros(3), brakes=[Brake(joint=1)], duration=0.1)

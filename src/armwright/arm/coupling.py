@@ -103,8 +103,8 @@ class Coupling:
 
     @property
     def mixed(self) -> tuple[int, ...]:
-        """Which drives, from 0, move another joint than their own, or whose joint another drive moves, too."""
-        off = self.matrix * ~np.eye(len(self.matrix), dtype=bool)
+        """Which drives, from 0, do not move just as their joint does, or do not move it alone."""
+        off = self.matrix - np.eye(len(self.matrix))
         return tuple(np.flatnonzero(off.any(axis=0) | off.any(axis=1)).tolist())
 
     def drives(self, q: Array) -> Array:

@@ -138,7 +138,7 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
     """Refuse a start outside the stops, a brake without a joint, a controller that drives another arm."""
     arm = plant.arm
     if arm.coupling is not None:
-        _refuse_coupled_friction(arm, arm.coupling)
+        _refuse_held_drives(arm, arm.coupling, plant.brakes)
     for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
         units = arm.joints[i].units
         unit = units.display
@@ -283,8 +283,8 @@ class _Run:
         )
 
 
-def _refuse_coupled_friction(arm: Arm, coupling: Coupling) -> None:
-    """Refuse what holds coupled drives and not joints: dry friction, and position limits of the drives.
+def _refuse_held_drives(arm: Arm, coupling: Coupling, brakes: Sequence[Brake]) -> None:
+    """Refuse what holds coupled drives and not joints: dry friction, brakes, and position limits of the drives.
 
     Raises:
         UnsupportedArmError: there is some.
@@ -296,6 +296,12 @@ def _refuse_coupled_friction(arm: Arm, coupling: Coupling) -> None:
             f"arm '{arm.name}' has coupled drives, and that of {arm.joint_label(int(np.argmax(rubs)))} has dry "
             "friction, which holds drives and not joints; this simulation has dry friction of joints only. Omit it, or "
             "run the arm in a cell with physics (armwright run --physics)"
+        )
+    held = [brake.joint for brake in brakes if brake.joint in coupling.mixed]
+    if held:
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': the drive of {arm.joint_label(held[0])} is coupled, so that a brake would hold the "
+            "drive and not the joint; this simulation has brakes of joints only. Omit it"
         )
     ends = np.isfinite([coupling.drive_limits.lower, coupling.drive_limits.upper]).any(axis=0)
     if ends.any():
