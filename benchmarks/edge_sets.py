@@ -4,8 +4,9 @@ import attrs
 import numpy as np
 from scipy.optimize import brentq
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Limits
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import armwright
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arm.limits import Limits
+from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.dynamics.accelerations import toacc
 from armwright.dynamics.bejczy import bejczy_efforts, fitted
 from armwright.dynamics.energy import kinetic_energy

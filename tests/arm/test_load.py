@@ -10,8 +10,9 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from armwright.arm import load
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm, read_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Limits, Link, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Link, Motor
 from armwright.errors import FileFormatError, UnknownNameError
 from armwright.spatial.rotations import exact_cosine, exact_sine
 

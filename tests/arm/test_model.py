@@ -12,8 +12,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.payloads import payload
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.spatial.rotations import exact_cosine, exact_sine

@@ -8,7 +8,8 @@ import pytest
 
 import armwright
 import doors
-from armwright.arm.model import Arm, Joint, Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import Arm, Joint, Link
 from armwright.errors import ArmwrightError, UnitWarning
 from armwright.simulation.controllers import gravity_compensation
 from doors import DOORS, PUMA

@@ -51,7 +51,7 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "another format": ("<sdf/>", "arm.urdf:1: expected <robot>, as URDF files have, got <sdf>"),
     "xacro": (
         '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:include filename="a"/></robot>',
-        "arm.urdf:2: <include>: expand xacro files to URDF first: xacro FILE > robot.urdf",
+        "arm.urdf:2: <include>: expand xacro files to URDF first: xacro arm.urdf > arm-expanded.urdf",
     ),
     "xacro without its namespace": (
         "<robot><xacro:include/></robot>",
@@ -76,8 +76,16 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "planar": (one(kind="planar"), "joint 'turn', type: an arm cannot have a planar joint"),
     "floating": (one(kind="floating"), "joint 'turn', type: an arm cannot have a floating joint"),
     "mimic": (
-        one(f'{LIMIT}<mimic joint="other"/>'),
-        "joint 'turn', mimic: the joint mimics 'other'; an arm can only have independent joints",
+        one(f'{LIMIT}<mimic joint="trun"/>'),
+        "joint 'turn', mimic, joint: there is no joint 'trun'; did you mean 'turn'?",
+    ),
+    "mimics of one another": (
+        one(f'{LIMIT}<mimic joint="turn"/>'),
+        "joint 'turn', mimic, joint: joints follow one another in a cycle: 'turn'",
+    ),
+    "mimic without a joint": (
+        one(f'{LIMIT}<mimic multiplier="2"/>'),
+        "joint 'turn', mimic, joint: missing",
     ),
     "nothing moves": (
         robot(link("base"), link("hand"), joint("weld", "fixed", "base", "hand")),
@@ -180,16 +188,20 @@ def test_mistakes_in_a_body(mistake: str, read: Callable[..., Arm]) -> None:
     assert message in str(caught.value)
 
 
-def test_fingers_beside_the_chain(read: Callable[..., Arm]) -> None:
-    """Fingers with mass that move beside the chain are refused by name, with the way out."""
+def test_loads_that_nothing_holds(read: Callable[..., Arm]) -> None:
+    """A rod with mass that follows a joint of the chain moves with it: it is refused by name, with the way out."""
+    rod = '<axis xyz="0 1 0"/>' + LIMIT + '<mimic joint="turn" multiplier="-1"/>'
+    text = ARM_WITH_GRIPPER.replace("</robot>", link("rod", MASS) + joint("follows", "revolute", "arm", "rod", rod))
+
     with pytest.raises(FileFormatError) as caught:
-        read(ARM_WITH_GRIPPER, tip="camera")
+        read(f"{text}</robot>", tip="camera")
 
     assert (
-        "joint 'left_slide': 2 joints lie beside the chain, move and have mass to carry: 'left_slide', 'right_slide'. "
-        "An arm has no branches: choose another tip, or lock them, at 0 or elsewhere: lock=['left_slide', "
-        "'right_slide'] (--lock left_slide,right_slide)"
+        "joint 'follows': 1 joint lies beside the chain, has mass to carry and moves with other joints or freely: "
+        "'follows'. An arm has no branches: choose another tip, or lock it, at 0 or elsewhere: lock=['follows'] "
+        "(--lock follows)"
     ) in str(caught.value)
+    assert read(f"{text}</robot>", tip="camera", lock=["follows"]).links[0].mass == 10
 
 
 @pytest.mark.parametrize(

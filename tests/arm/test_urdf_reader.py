@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm, read_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Limits, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Motor
 from armwright.arm.urdf.reader import load_urdf, read_urdf
 from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
 from armwright.arm.write import toml_text

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Motor
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.arm.urdf.writer import lost_in_urdf, urdf_text

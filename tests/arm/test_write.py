@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.arm.write import toml_text
 from armwright.errors import InvalidValueError
 from oracles.arms import random_arm, squared

@@ -6,8 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, JointKind, Limits
+from armwright.arm.model import Arm, Joint, JointKind
 from armwright.calibration.chain import kinematic_chain
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.experiment_design import INDICES, observability, plan_poses

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, Limits
+from armwright.arm.model import Arm, Joint
 from armwright.calibration.measurements import read_measurements
 from armwright.errors import FileFormatError, IncompleteRowsWarning, UnknownNameError
 

@@ -7,8 +7,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Limits
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution, Outcome

@@ -6,8 +6,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, Limits
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses, per_joint, stack

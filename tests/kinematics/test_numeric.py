@@ -4,8 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, Limits
+from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE

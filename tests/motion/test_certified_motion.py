@@ -6,8 +6,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, Limits, Link
+from armwright.arm.model import Arm, Joint, Link
 from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse

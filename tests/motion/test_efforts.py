@@ -4,8 +4,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, Spring
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics

@@ -7,8 +7,9 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm, Joint, Limits
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError, InvalidValueError, KindError, MissingExtraError, ShapeError
 from armwright.motion.online import JERK_TIME, OnlineError, replace_goal, retarget

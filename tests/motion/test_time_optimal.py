@@ -9,8 +9,9 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import (

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from armwright.arm.model import Arm, Joint, Limits
+from armwright.arm.limits import Limits
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.motion.solver import solver_of
 from armwright.motion.timing_law import TimedPath, timed

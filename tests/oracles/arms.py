@@ -3,7 +3,9 @@
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor, Spring
+from armwright.arm.coupling import Coupling
+from armwright.arm.limits import Limits
+from armwright.arm.model import Arm, Joint, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
@@ -101,3 +103,14 @@ def with_springs(arm: Arm, rng: np.random.Generator) -> Arm:
         for i, joint in enumerate(arm.joints)
     ]
     return attrs.evolve(arm, joints=joints)
+
+
+def coupled(arm: Arm, rng: np.random.Generator, limits: tuple[Limits, ...] = ()) -> Arm:
+    """The arm with drives that move several joints each, but for some that move their own alone."""
+    while True:
+        C = np.diag(rng.uniform(0.5, 2.0, size=arm.n) * rng.choice([-1, 1], size=arm.n))
+        alone = rng.random(arm.n) < 0.3
+        C[alone, alone] = 1.0
+        C += (rng.random((arm.n, arm.n)) < 0.3) * rng.normal(size=(arm.n, arm.n)) * ~np.eye(arm.n, dtype=bool) * ~alone
+        if np.linalg.cond(C) < 20 and not np.array_equal(C, np.eye(arm.n)):
+            return attrs.evolve(arm, coupling=Coupling(matrix=C, limits=limits))

@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm, read_arm
 from armwright.arm.mjcf.reader import load_mjcf
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.arm.tensors import impossible_moments
 from armwright.arrays import Array
 from armwright.cell.reader import read_cell

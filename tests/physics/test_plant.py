@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.energy import kinetic_energy, potential_energy

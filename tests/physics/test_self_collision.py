@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from armwright.arm.collision_pairs import CollisionPairs
+from armwright.arm.limits import Limits
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import Arm, Joint, Limits, Link
+from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.physics.cell_bodies import Body, arm_bodies

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.model import JointLimits
+from armwright.arm.limits import JointLimits
 from armwright.report.elements import Tile, headline
 from armwright.report.headline import run_headline
 from armwright.report.limit_spans import LimitSpan, limit_spans

@@ -3,7 +3,8 @@
 import attrs
 import numpy as np
 
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.limits import Limits
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.simulation.result import JointState, Simulation, Status
 from oracles.arms import random_arm

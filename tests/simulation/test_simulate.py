@@ -6,8 +6,9 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link
 from armwright.dynamics.energy import kinetic_energy
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import gravity_efforts

@@ -26,7 +26,7 @@ from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_hea
 from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import Scalar, atan2, cbrt, exp, round_half_even, sqrt
 from oracles import compilers
-from oracles.arms import of_all_kinds, random_arm, with_all_friction, with_springs
+from oracles.arms import coupled, of_all_kinds, random_arm, with_all_friction, with_springs
 from oracles.compilers import (
     COMPILERS,
     FMA,
@@ -149,6 +149,21 @@ def test_friction_of_all_kinds(name: str, joints: int, tmp_path: Path, sample: S
     rows = assert_same_bits(name, arm, names, tmp_path, rng)
 
     sample.record(f"rows of arms with friction of all kinds with the processor's bits, {name}", rows, 0)
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+@pytest.mark.parametrize("joints", [4, 20])
+@pytest.mark.drawn(0.15)
+def test_coupled_drives(name: str, joints: int, tmp_path: Path, sample: Sample) -> None:
+    """Drives that move several joints have the bits of the processor, in arms of which loops stay loops, too."""
+    rng = np.random.default_rng(sample.seed)
+    arm = coupled(with_all_friction(random_arm(rng, joints), rng), rng)
+    names = ["inverse_dynamics", "kinetic_energy"]
+    names += ["forward_dynamics", "mass_and_bias", "forward_dynamics_derivatives", "regressor"] if joints < 5 else []
+
+    rows = assert_same_bits(name, arm, names, tmp_path, rng)
+
+    sample.record(f"rows of arms with coupled drives with the processor's bits, {name}", rows, 0)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "g++"])

@@ -1,8 +1,10 @@
 from .collision_pairs import CollisionPairs as CollisionPairs
+from .coupling import Coupling as Coupling
 from .drive import Motor as Motor, Spring as Spring
+from .limits import Limits as Limits
 from .load import arm_names as arm_names, load_arm as load_arm
 from .mjcf.reader import load_mjcf as load_mjcf
-from .model import Arm as Arm, Joint as Joint, Limits as Limits, Link as Link
+from .model import Arm as Arm, Joint as Joint, Link as Link
 from .uncertainty import Uncertainty as Uncertainty
 from .urdf.reader import load_urdf as load_urdf
 from .urdf.writer import urdf_text as urdf_text

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.gravity import vector_text
+from armwright.arm.limits import Limits
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.files.result_table import ResultTable
@@ -34,7 +36,7 @@ def tables(model: Arm) -> Iterator[ResultTable]:
     yield _dh_table(model)
     if any(joint.fixed is not None for joint in model.joints):
         yield _fixed_joint_table(model)
-    yield _limit_table(model)
+    yield _limit_table(model, "Limits", [joint.limits for joint in model.joints])
     if unknown := [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]:
         title = f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}"
         yield ResultTable(title=title, heads=(), rows=())
@@ -47,6 +49,10 @@ def tables(model: Arm) -> Iterator[ResultTable]:
         yield _drive_table(model)
     else:
         yield ResultTable(title="Drives: no inertia or friction is known", heads=(), rows=())
+    if model.coupling is not None:
+        yield _coupling_table(model.coupling)
+        if model.coupling.limits:
+            yield _limit_table(model, "Limits of the drives", model.coupling.limits, "drive")
     if any(joint.spring.stiffness for joint in model.joints):
         yield _spring_table(model)
 
@@ -108,15 +114,20 @@ def _dh_table(model: Arm) -> ResultTable:
     return ResultTable(title="Denavit-Hartenberg, standard", heads=heads, rows=rows)
 
 
-def _limit_table(model: Arm) -> ResultTable:
+def _limit_table(model: Arm, title: str, each: Sequence[Limits], what: str = "joint") -> ResultTable:
     rows = []
-    for i, joint in enumerate(model.joints, 1):
-        limits = joint.limits
+    for i, (joint, limits) in enumerate(zip(model.joints, each, strict=True), 1):
         effort = "-" if math.isinf(limits.effort) else f"{limits.effort:g} {joint.units.effort}"
         positions = _position(joint, limits.lower), _position(joint, limits.upper)
         rates = _position(joint, limits.speed, "/s"), _position(joint, limits.acceleration, "/s²")
         rows.append((str(i), *positions, *rates, effort))
-    return ResultTable(title="Limits", heads=("joint", "from", "to", "speed", "acceleration", "effort"), rows=rows)
+    return ResultTable(title=title, heads=(what, "from", "to", "speed", "acceleration", "effort"), rows=rows)
+
+
+def _coupling_table(coupling: Coupling) -> ResultTable:
+    rows = [(str(i), *(f"{x:z.6g}" for x in row)) for i, row in enumerate(coupling.matrix, 1)]
+    title = "Coupling: the joints by the drives (rad, m)"
+    return ResultTable(title=title, heads=("joint", *(f"drive {i}" for i in range(1, len(rows) + 1))), rows=rows)
 
 
 def _mass_table(model: Arm) -> ResultTable:
@@ -147,8 +158,11 @@ def _drive_table(model: Arm) -> ResultTable:
             values["Stribeck friction"] += f", exp(-(v / {_position(joint, motor.stribeck_speed, '/s')})²)"
         more = [values[head] for head in others]
         rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, *more, f"{motor.gear_ratio:g}"))
-    heads = ("joint", "inertia", "viscous", "Coulomb friction", *others, "gear ratio")
-    return ResultTable(title="Drives, reflected to the joint", heads=heads, rows=rows)
+    what, title = "joint", "Drives, reflected to the joint"
+    if model.coupling is not None:
+        what, title = "drive", "Drives, behind their gears"
+    heads = (what, "inertia", "viscous", "Coulomb friction", *others, "gear ratio")
+    return ResultTable(title=title, heads=heads, rows=rows)
 
 
 def _spring_table(model: Arm) -> ResultTable:

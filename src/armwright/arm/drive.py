@@ -44,7 +44,7 @@ def check_numbers(part: Any, what: str, names: Iterable[str], must: str = "", la
 
 @attrs.frozen(kw_only=True)
 class Motor:
-    """The drive of a joint, as felt at the joint.
+    """The drive of a joint, as felt at the joint; of an arm with a ``Coupling``, at the drive behind its gear.
 
     At the velocity v its friction takes, with the sign of v,
 

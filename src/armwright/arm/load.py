@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from armwright.arm.collision_pairs import collision_pairs_in
+from armwright.arm.coupling import Coupling
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
+from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path
@@ -83,11 +86,16 @@ def read_arm(path: Path | str) -> Arm:
     top = Document.read(path).root
     convention = top.choice("convention", ("standard", "modified"), default="standard")
     tables = top.tables("joint", "joints")
-    joints, links, motors = [], [], []
+    coupled, coupling = "coupling" in top, top.table("coupling")
+    rows = coupling.vectors("matrix", len(tables)) if coupled else []
+    coupling.refuse_unknown_keys()
+    joints, links, motors, drive_limits = [], [], [], []
     for table in tables:
         joints.append(_joint(table))
         links.append(_link(table.table("link")))
-        motors.append(_motor(table.table("motor"), joints[-1].revolute))
+        motor = table.table("motor")
+        drive_limits.append(_drive_limits(motor, joints[-1].kind, coupled=coupled))
+        motors.append(_motor(motor, joints[-1].revolute))
         table.refuse_unknown_keys()
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
     if convention == "modified":
@@ -102,6 +110,7 @@ def read_arm(path: Path | str) -> Arm:
         joints=joints,
         links=links,
         motors=motors,
+        coupling=_coupling(coupling, rows, drive_limits) if coupled else None,
         base=base,
         tool=tool,
         gravity=gravity.vector("m_per_s2", 3, default=UPRIGHT_GRAVITY),
@@ -149,11 +158,25 @@ def _uncertainty(table: Table) -> Uncertainty | None:
 
 def _joint(table: Table) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic"))
-    limits = table.table("limits")
     table.allow("fixed")
     units = ANGLE if kind == "revolute" else LENGTH
-    effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
     spring = table.table("spring")
+    return Joint(
+        kind="revolute" if kind == "revolute" else "prismatic",
+        theta=number_in(table, "theta", ANGLE, default=0.0),
+        d=number_in(table, "d", LENGTH, default=0.0),
+        a=number_in(table, "a", LENGTH, default=0.0),
+        alpha=number_in(table, "alpha", ANGLE, default=0.0),
+        fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
+        limits=_limits(table.table("limits"), kind),
+        spring=_spring(spring, units),
+        name=table.text("name", default=""),
+    )
+
+
+def _limits(limits: Table, kind: str) -> Limits:
+    """Read what a joint, or its drive, may do."""
+    units, effort = (ANGLE, {"Nm": 1.0}) if kind == "revolute" else (LENGTH, {"N": 1.0})
     values = {
         "lower": number_in(limits, "lower", units, default=-math.inf),
         "upper": number_in(limits, "upper", units, default=math.inf),
@@ -173,17 +196,27 @@ def _joint(table: Table) -> Joint:
                 f"too far from zero: {limit_message('revolutions', _written(kind, values[name]))}; for a joint without "
                 "limits omit it",
             )
-    return Joint(
-        kind="revolute" if kind == "revolute" else "prismatic",
-        theta=number_in(table, "theta", ANGLE, default=0.0),
-        d=number_in(table, "d", LENGTH, default=0.0),
-        a=number_in(table, "a", LENGTH, default=0.0),
-        alpha=number_in(table, "alpha", ANGLE, default=0.0),
-        fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
-        limits=Limits(**values),
-        spring=_spring(spring, units),
-        name=table.text("name", default=""),
-    )
+    return Limits(**values)
+
+
+def _drive_limits(motor: Table, kind: str, *, coupled: bool) -> Limits | None:
+    """Read what a drive may do; None where nothing is said."""
+    if "limits" not in motor:
+        return None
+    if not coupled:
+        message = "the drive moves its joint alone; specify [joint.limits], or how the drives are coupled: [coupling]"
+        raise motor.error("limits", message)
+    return _limits(motor.table("limits"), kind)
+
+
+def _coupling(table: Table, rows: Sequence[Array], drive_limits: Sequence[Limits | None]) -> Coupling:
+    """Return how the drives move the joints, by the rows of the matrix; limits are None where the file has none."""
+    if len(rows) != len(drive_limits):
+        raise table.error("matrix", f"expected {len(drive_limits)} rows, one for each joint, got {len(rows)}")
+    try:
+        return Coupling(matrix=np.array(rows), limits=[each or Limits() for each in drive_limits])
+    except (InvalidValueError, ShapeError) as error:
+        raise table.error("matrix", str(error).removeprefix("coupling: ")) from error
 
 
 def _link(table: Table) -> Link:

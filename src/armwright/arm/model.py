@@ -20,7 +20,9 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs, of_its_bodies
+from armwright.arm.coupling import Coupling
 from armwright.arm.drive import Motor, Spring, check_numbers
+from armwright.arm.limits import JointLimits, Limits
 from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.units import PRISMATIC, REVOLUTE, JointUnits
@@ -85,53 +87,6 @@ def _inertia(value: ArrayLike) -> Array:
 
 
 @attrs.frozen(kw_only=True)
-class Limits:
-    """What a joint may do. Positions [rad] or [m]; the others are magnitudes; infinite where nothing is known.
-
-    Attributes:
-        lower: smallest position.
-        upper: largest position.
-        speed: largest speed [rad/s] or [m/s].
-        acceleration: largest acceleration [rad/s²] or [m/s²].
-        effort: largest torque [N m] or force [N], at the joint.
-    """
-
-    lower: float = -math.inf
-    upper: float = math.inf
-    speed: float = math.inf
-    acceleration: float = math.inf
-    effort: float = math.inf
-
-    def __attrs_post_init__(self) -> None:
-        """Refuse limits that nothing can satisfy."""
-        check_numbers(self, "limits", ("lower", "upper"))
-        check_numbers(self, "limits", ("speed", "acceleration", "effort"), "above 0")
-        if not self.lower < self.upper:
-            raise InvalidValueError(f"limits: lower {self.lower:g} must be below upper {self.upper:g}")
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class JointLimits:
-    """The ``Limits`` of n joints, one array of each.
-
-    Attributes:
-        lower: (n,) smallest positions [rad] or [m].
-        upper: (n,) largest positions.
-        speed: (n,) largest speeds [rad/s] or [m/s].
-        acceleration: (n,) largest accelerations [rad/s²] or [m/s²].
-        effort: (n,) largest torques [N m] or forces [N], at the joints.
-    """
-
-    lower: Array = attrs.field(converter=read_only)
-    upper: Array = attrs.field(converter=read_only)
-    speed: Array = attrs.field(converter=read_only)
-    acceleration: Array = attrs.field(converter=read_only)
-    effort: Array = attrs.field(converter=read_only)
-
-    __reduce__ = reduce_by_fields
-
-
-@attrs.frozen(kw_only=True)
 class Joint:
     """One joint and the fixed geometry of the link it moves.
 
@@ -153,7 +108,7 @@ class Joint:
     a: float = 0.0
     alpha: float = 0.0
     fixed: Array | None = attrs.field(default=None, converter=_fixed, eq=_content)
-    limits: Limits = Limits()
+    limits: Limits = attrs.field(factory=Limits)
     spring: Spring = attrs.field(factory=Spring)
     name: str = ""
 
@@ -263,6 +218,25 @@ def _same_length(arm: Arm, attribute: attrs.Attribute[Any], value: Sized) -> Non
         raise ShapeError(f"arm '{arm.name}': {len(arm.joints)} joints but {len(value)} {attribute.name}")
 
 
+def _coupling(value: Coupling | None) -> Coupling | None:
+    """Return what couples the drives; None where each moves its own joint alone, as if nothing were said."""
+    if not isinstance(value, Coupling):
+        return value
+    return None if np.array_equal(value.matrix, np.eye(len(value.matrix))) else value
+
+
+def _of_its_joints(arm: Arm, _: attrs.Attribute[Any], value: Coupling | None) -> None:
+    if value is None:
+        return
+    if not isinstance(value, Coupling):
+        raise KindError(f"arm '{arm.name}': expected coupling to be a Coupling or None, got {shown(value)}")
+    if len(value.matrix) != len(arm.joints):
+        raise ShapeError(
+            f"arm '{arm.name}': {len(arm.joints)} joints but a coupling of {len(value.matrix)}; expected a row and a "
+            "column for each joint"
+        )
+
+
 @attrs.frozen(kw_only=True, repr=False, cache_hash=True)
 class Arm:
     """A serial arm of n joints. Equal arms hash equal, so an arm can be a key.
@@ -273,6 +247,7 @@ class Arm:
         joints: n joints from the base to the hand.
         links: n links, in the same order.
         motors: n drives, in the same order.
+        coupling: how the drives move the joints; None where each moves its own joint alone.
         base: (4, 4) pose of Denavit-Hartenberg frame 0 in the base frame of the arm.
         tool: (4, 4) pose of the tool in the frame of the last link.
         gravity: (3,) acceleration of free fall in the base frame [m/s²].
@@ -301,6 +276,7 @@ class Arm:
         converter=_motors,
         validator=_same_length,
     )
+    coupling: Coupling | None = attrs.field(default=None, converter=_coupling, validator=_of_its_joints)
     base: Array = attrs.field(factory=lambda: np.eye(4), converter=_base, eq=array_key)
     tool: Array = attrs.field(factory=lambda: np.eye(4), converter=_tool, eq=array_key)
     gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_gravity, eq=array_key)
@@ -347,6 +323,18 @@ class Arm:
         """The limits of all joints, each (n,)."""
         values = np.array([attrs.astuple(joint.limits) for joint in self.joints]).T
         return JointLimits(**dict(zip(attrs.fields_dict(Limits), values, strict=True)))
+
+    @cached_property
+    def all_limits(self) -> JointLimits:
+        """The limits of all joints, and behind them of all drives where coupled drives have limits of their own.
+
+        Each is (n,) or (2 n,); number k belongs to joint k % n or its drive.
+        """
+        if self.coupling is None or not self.coupling.limits:
+            return self.limits
+        own, of_drives = self.limits, self.coupling.drive_limits
+        names = attrs.fields_dict(JointLimits)
+        return JointLimits(**{x: np.concatenate([getattr(own, x), getattr(of_drives, x)]) for x in names})
 
     @cached_property
     def revolute(self) -> Flags:

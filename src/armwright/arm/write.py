@@ -13,7 +13,9 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import body_names
+from armwright.arm.coupling import Coupling
 from armwright.arm.drive import Motor
+from armwright.arm.limits import Limits
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.positions import known_arm
 from armwright.arm.tensors import impossible_moments
@@ -65,6 +67,8 @@ def _lines(arm: Arm) -> Iterator[str]:
     if arm.gravity_from == "stated" or not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         yield from _table("gravity", {"m_per_s2": arm.gravity})
     yield from _collisions(arm)
+    if arm.coupling is not None:
+        yield from _coupling(arm.coupling)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
         yield f'kind = "{joint.kind}"'
@@ -75,10 +79,12 @@ def _lines(arm: Arm) -> Iterator[str]:
         yield ""
         if joint.fixed is not None:
             yield from _pose("joint.fixed", joint.fixed) if not np.array_equal(joint.fixed, np.eye(4)) else ()
-        yield from _table("joint.limits", _limits(joint))
+        yield from _table("joint.limits", _limits(joint, joint.limits))
         yield from _table("joint.spring", _spring(joint))
         yield from _body(arm, i, link)
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
+        if arm.coupling is not None and arm.coupling.limits:
+            yield from _table("joint.motor.limits", _limits(joint, arm.coupling.limits[i - 1]))
     if arm.uncertainty is not None:
         yield from _uncertainty(arm.uncertainty)
 
@@ -104,11 +110,21 @@ def _uncertainty(known: Uncertainty) -> Iterator[str]:
     yield from _numbers({"noise_m": known.noise})
 
 
-def _limits(joint: Joint) -> dict[str, float]:
+def _coupling(coupling: Coupling) -> Iterator[str]:
+    """Write how the drives move the joints."""
+    yield "[coupling]  # rows of joints, columns of drives"
+    yield "matrix = ["
+    yield from (f"    {row.tolist()!r}," for row in coupling.matrix + 0.0)
+    yield "]"
+    yield ""
+
+
+def _limits(joint: Joint, limits: Limits) -> dict[str, float]:
+    """Return what a joint, or its drive, may do."""
     position, effort = ("rad", "Nm") if joint.revolute else ("m", "N")
     units = (position, position, f"{position}_per_s", f"{position}_per_s2", effort)
-    limits = zip(attrs.asdict(joint.limits).items(), units, strict=True)
-    return {f"{name}_{unit}": value for (name, value), unit in limits if math.isfinite(value)}
+    numbers = zip(attrs.asdict(limits).items(), units, strict=True)
+    return {f"{name}_{unit}": value for (name, value), unit in numbers if math.isfinite(value)}
 
 
 def _spring(joint: Joint) -> dict[str, float]:

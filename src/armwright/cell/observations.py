@@ -19,7 +19,7 @@ class MeasuredStream:
         t: (k,) times [s].
         q: (k, n) joint positions, as the sensors read them [rad] or [m].
         qd: (k, n) joint speeds, as the sensors read them.
-        tau: (k, n) efforts of the motors [N m] or [N].
+        tau: (k, n) efforts of the motors, at the joints [N m] or [N].
         sent: (k, n) joint positions that the arm was sent to.
         actual: (k, n) joint positions as they were in the world.
         opening: (k,) distance between the fingers [m].

@@ -88,6 +88,7 @@ def _causes(model: "Arm", terms: "Terms") -> "dict[str, Array]":
         others["other friction"] = terms.smooth
     if any(joint.spring.stiffness for joint in model.joints):
         others["springs"] = terms.spring
+    drives = {} if model.coupling is None else {"of the drives": model.coupling.drive_efforts(terms.total)}
     return {
         "own inertia": terms.own,
         "coupling": terms.coupling.sum(axis=-1),
@@ -100,6 +101,7 @@ def _causes(model: "Arm", terms: "Terms") -> "dict[str, Array]":
         "load": terms.load,
         "wrench": terms.outside,
         "total": terms.total,
+        **drives,
     }
 
 

@@ -107,7 +107,9 @@ def _bits(value: object) -> object:
         return tuple(map(_bits, value))
     if attrs.has(kind := type(value)):
         names = (field.name for field in attrs.fields(kind) if field.name not in _IN_NO_EQUATION)
-        return kind.__qualname__, *(_bits(getattr(value, name)) for name in names)
+        # The code of an arm whose drives are not coupled is known from before there were couplings.
+        values = ((name, getattr(value, name)) for name in names)
+        return kind.__qualname__, *(_bits(x) for name, x in values if name != "coupling" or x is not None)
     return value.hex() if isinstance(value, float) else value
 
 

@@ -9,11 +9,11 @@ from typing import NamedTuple
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
 from armwright.arrays import Array
-from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics
+from armwright.dynamics.accelerations import NEGLIGIBLE, driven_accelerations, forward_dynamics
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.articulated_body import Pivot, articulated_body
+from armwright.dynamics.articulated_body import Pivot
 from armwright.dynamics.derivatives import acceleration_partials, effort_partials, forward_dynamics_derivatives
-from armwright.dynamics.drives import less_friction, with_drives
+from armwright.dynamics.drives import less_friction, with_drives, with_rotors
 from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy, rotor_energy
 from armwright.dynamics.identification import base_parameters, effort_base_regressor
 from armwright.dynamics.inertia_matrix import composite_rigid_body
@@ -160,7 +160,7 @@ def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: 
 
 def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:
     driving = less_springs(arm, less_friction(arm, qd, tau), q)
-    accelerations, pivots = articulated_body(arm, q, qd, driving)
+    accelerations, pivots = driven_accelerations(arm, q, qd, driving)
     return _if_inertias_count([accelerations], pivots)
 
 
@@ -170,10 +170,7 @@ def _if_inertias_count(values: Rows, pivots: Iterable[Pivot]) -> Guarded:
 
 
 def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
-    M = composite_rigid_body(arm, q)
-    for i, motor in enumerate(arm.motors):
-        M[i][i] = M[i][i] + motor.inertia
-    return [_flat(M)]
+    return [_flat(with_rotors(arm, composite_rigid_body(arm, q)))]
 
 
 def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:

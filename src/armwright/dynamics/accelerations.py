@@ -10,14 +10,16 @@ import numpy as np
 from armwright.arm.drive import Motor
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.dynamics.arguments import batch, stack_matrix
+from armwright.dynamics.arguments import NO_WRENCH, Scalars, batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot, articulated_body
-from armwright.dynamics.drives import less_friction
+from armwright.dynamics.drives import less_friction, with_rotors
+from armwright.dynamics.inertia_matrix import composite_rigid_body, inverse_of_mass
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.springs import less_springs
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
+from armwright.tracing.vectors import apply, subtract
 
 # An inertia this small beside the others of its kind is zero but for rounding.
 NEGLIGIBLE = 1e-12
@@ -57,9 +59,33 @@ def forward_dynamics(
         # A division by zero must raise no error here: the check of the pivots reports it.
         q_, qd_, driving = ([np.array(x) for x in scalars] for scalars in (q_, qd_, driving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        accelerations, pivots = articulated_body(model, q_, qd_, driving, push)
+        accelerations, pivots = driven_accelerations(model, q_, qd_, driving, push)
     check_pivots(model, pivots)
     return stack(accelerations, lead)
+
+
+def driven_accelerations(
+    arm: Arm, q: Scalars, qd: Scalars, driving: Scalars, wrench: Scalars = NO_WRENCH
+) -> tuple[list[Scalar], list[Pivot]]:
+    """Return the accelerations that efforts cause, less those of friction and springs, over abstract scalars.
+
+    The articulated-body algorithm has each rotor at its joint. Rotors of coupled drives are turned by several joints;
+    there the mass matrix is factorized.
+
+    Args:
+        arm: the arm, with n joints.
+        q: n joint positions.
+        qd: n joint velocities.
+        driving: n efforts.
+        wrench: as in ``articulated_body``.
+
+    Returns:
+        n accelerations, and n pivots, as of ``articulated_body``.
+    """
+    if arm.coupling is None:
+        return articulated_body(arm, q, qd, driving, wrench)
+    inverse, pivots = inverse_of_mass(arm, with_rotors(arm, composite_rigid_body(arm, q)))
+    return apply(inverse, subtract(driving, newton_euler(arm, q, qd, [0.0] * arm.n, wrench))), pivots
 
 
 def toacc(
@@ -109,12 +135,10 @@ def unit_accelerations(arm: Arm, q: Sequence[Scalar]) -> list[list[Scalar]]:
     """
     still = [0.0] * arm.n
     columns = []
-    for i, motor in enumerate(arm.motors):
+    for i in range(arm.n):
         unit = [1.0 if j == i else 0.0 for j in range(arm.n)]
-        column = newton_euler(arm, q, still, unit, base_acceleration=arm.gravity.tolist())
-        column[i] = column[i] + motor.inertia
-        columns.append(column)
-    return [list(row) for row in zip(*columns, strict=True)]
+        columns.append(newton_euler(arm, q, still, unit, base_acceleration=arm.gravity.tolist()))
+    return with_rotors(arm, [list(row) for row in zip(*columns, strict=True)])
 
 
 def eliminated(arm: Arm, M: Array) -> list[Pivot]:
@@ -151,4 +175,4 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
 
 
 def _without_drives(arm: Arm) -> Arm:
-    return attrs.evolve(arm, motors=[Motor()] * arm.n)
+    return attrs.evolve(arm, motors=[Motor()] * arm.n, coupling=None)

@@ -85,7 +85,7 @@ def articulated_body(
 ) -> tuple[list[Scalar], list[Pivot]]:
     """Return the accelerations that efforts cause, over abstract scalars, in time proportional to n.
 
-    Rotor inertia counts; friction does not: subtract it from ``tau`` before.
+    Rotor inertia counts, of drives that are not coupled; friction does not: subtract it from ``tau`` before.
 
     Args:
         arm: the arm, with n joints.

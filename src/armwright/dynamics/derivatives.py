@@ -12,13 +12,13 @@ from armwright.dynamics.accelerations import check_pivots
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot
 from armwright.dynamics.drives import less_friction, with_drives
+from armwright.dynamics.inertia_matrix import inverse_of_mass
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.springs import with_springs
 from armwright.tracing.derivatives import jacobian, replaced
 from armwright.tracing.evaluation import evaluate
 from armwright.tracing.graph import Graph, Traced
-from armwright.tracing.scalar import Scalar
-from armwright.tracing.vectors import Matrix, apply, dot, mirrored, product, scale, subtract
+from armwright.tracing.vectors import Matrix, apply, mirrored, product, scale, subtract
 
 
 class EffortDerivatives(NamedTuple):
@@ -183,42 +183,3 @@ def acceleration_partials(
     at_accelerations = [replaced(row, by, graph) for row in dq]
     opposite = [scale(-1.0, row) for row in inverse]
     return (product(opposite, at_accelerations), product(opposite, dqd), inverse), pivots
-
-
-def inverse_of_mass(arm: Arm, M: Matrix) -> tuple[Matrix, list[Pivot]]:
-    """Return the inverse of a mass matrix by M = Lᵀ D L, and its pivots D, over abstract scalars.
-
-    Elimination goes from the last joint to the first, so that a pivot is the inertia about or along a joint while all
-    joints beyond it are free. No row is exchanged: a mass matrix is positive definite.
-
-    Args:
-        arm: the arm, with n joints.
-        M: n x n, of which the upper half is read.
-
-    Returns:
-        The inverse, n x n and symmetric, and n pivots.
-
-    Source:
-        Featherstone (2008), chapter 6: the LTDL factorization, here of a matrix without zeros.
-    """
-    n = arm.n
-    rest = [list(row) for row in M]
-    L: Matrix = [[0.0] * i for i in range(n)]
-    reciprocals: list[Scalar] = [0.0] * n
-    for i in reversed(range(n)):
-        reciprocals[i] = 1.0 / rest[i][i]
-        L[i] = [rest[j][i] * reciprocals[i] for j in range(i)]
-        for k in range(i):
-            for j in range(k + 1):
-                rest[j][k] = rest[j][k] - L[i][j] * rest[k][i]
-    # The inverse of L, of which the diagonal is 1.
-    X: Matrix = [[*[0.0] * i, 1.0] for i in range(n)]
-    for i in range(n):
-        for j in range(i):
-            X[i][j] = -sum((L[i][k] * X[k][j] for k in range(j + 1, i)), start=L[i][j])
-    weighted = [[x * reciprocal for x, reciprocal in zip(row, reciprocals, strict=False)] for row in X]
-    lower = [[dot(weighted[i][: j + 1], X[j]) for j in range(i + 1)] for i in range(n)]
-    inverse = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
-    # Moments of inertia are compared with moments of inertia, masses with masses.
-    alike = [[k for k in range(n) if arm.revolute[k] == arm.revolute[i]] for i in range(n)]
-    return inverse, [Pivot(rest[i][i], sum(M[k][k] for k in alike[i])) for i in range(n)]

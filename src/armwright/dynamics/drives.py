@@ -1,7 +1,13 @@
-"""The drives of the joints: rotor inertia and the law of friction, over abstract scalars."""
+"""The drives of the joints: rotor inertia and the law of friction, over abstract scalars.
+
+Where drives are coupled they have velocities of their own, m' = C⁻¹ q', and what they require of efforts is seen at the
+joints as C⁻ᵀ times that. Of a matrix only what is not 0 is computed: a drive that moves its own joint alone costs
+nothing more, and has the same bits as without a coupling.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +18,16 @@ from armwright.arrays import Array
 from armwright.dynamics.arguments import Scalars
 from armwright.tracing.scalar import Scalar, cbrt, exp, select
 from armwright.tracing.scan import scan
+from armwright.tracing.vectors import Matrix, add, subtract
 
 # Below this speed friction by the cube root of the speed is in proportion to the speed [rad/s, m/s].
 SLOW = 1e-4
 
 
 class FrictionLaw(NamedTuple):
-    """The friction of a joint by its numbers, or of n joints by arrays (n,), as ``Motor`` describes it.
+    """The friction of a drive by its numbers, or of n drives by arrays (n,), as ``Motor`` describes it.
+
+    Velocities and efforts are those of the drives. Where these are coupled, they are others than those of the joints.
 
     Terms that few arms have are None where there are none: they leave nothing in the code of an arm.
 
@@ -76,14 +85,58 @@ def unit_cube_root_friction(velocity: Scalar) -> Scalar:
     return select(abs(velocity) < SLOW, velocity * SLOW ** (-2 / 3), cbrt(velocity))
 
 
+def drive_rates(arm: Arm, rates: Scalars) -> list[Scalar]:
+    """Return the velocities or accelerations of the drives, from those of the joints."""
+    if arm.coupling is None:
+        return list(rates)
+    return [_combined(row, rates) for row in arm.coupling.inverse.tolist()]
+
+
+def drives_at_joints(arm: Arm, efforts: Scalars) -> list[Scalar]:
+    """Return efforts at the drives as the joints see them."""
+    if arm.coupling is None:
+        return list(efforts)
+    return [_combined(row, efforts) for row in arm.coupling.inverse.T.tolist()]
+
+
+def _combined(weights: Sequence[float], values: Scalars) -> Scalar:
+    """Return the sum of weighted values, of which at least one weight is not 0."""
+    first, *others = (
+        value if weight == 1 else weight * value for weight, value in zip(weights, values, strict=True) if weight
+    )
+    return sum(others, start=first)
+
+
 def with_drives(arm: Arm, efforts: Scalars, qd: Scalars, qdd: Scalars) -> list[Scalar]:
     """Return efforts and what the drives themselves require beside them: rotor inertia and friction."""
-    return scan(_with_drive, (), _drives(arm), efforts, qd, qdd)[1]
+    if arm.coupling is None:
+        return scan(_with_drive, (), _drives(arm), efforts, qd, qdd)[1]
+    return add(efforts, _own_at_joints(arm, qd, qdd))
 
 
 def less_friction(arm: Arm, qd: Scalars, tau: Scalars) -> list[Scalar]:
     """Return the efforts less the friction of the moving drives."""
-    return scan(_less_friction, (), _drives(arm), qd, tau)[1]
+    if arm.coupling is None:
+        return scan(_less_friction, (), _drives(arm), qd, tau)[1]
+    return subtract(tau, _own_at_joints(arm, qd, [0.0] * arm.n))
+
+
+def _own_at_joints(arm: Arm, qd: Scalars, qdd: Scalars) -> list[Scalar]:
+    """Return what coupled drives require by themselves, as the joints see it."""
+    states = zip(_drives(arm), drive_rates(arm, qd), drive_rates(arm, qdd), strict=True)
+    return drives_at_joints(arm, [_own_effort(*state) for state in states])
+
+
+def with_rotors(arm: Arm, M: Matrix) -> Matrix:
+    """Return a mass matrix of links with the inertia of the rotors."""
+    if arm.coupling is None:
+        return [
+            [x + motor.inertia if i == j else x for j, x in enumerate(row)]
+            for i, (row, motor) in enumerate(zip(M, arm.motors, strict=True))
+        ]
+    T = arm.coupling.inverse
+    rotors = (T.T @ (arm.motor_values("inertia")[:, None] * T)).tolist()
+    return [[x + rotor if rotor else x for x, rotor in zip(*rows, strict=True)] for rows in zip(M, rotors, strict=True)]
 
 
 def joint_friction_law(motor: Motor) -> FrictionLaw:
@@ -120,7 +173,7 @@ def friction_law(arm: Arm) -> FrictionLaw:
 
 
 def coulomb_friction(arm: Arm, qd: Array) -> Array:
-    """Return the Coulomb friction of moving joints, 0 of a joint at rest.
+    """Return the Coulomb friction of moving drives as the joints see it, 0 of a drive at rest.
 
     Args:
         arm: the arm, with n joints.
@@ -129,7 +182,18 @@ def coulomb_friction(arm: Arm, qd: Array) -> Array:
     Returns:
         (..., n) the efforts that overcome it [N m] or [N], positive in the direction of q.
     """
-    return np.asarray(friction_law(arm)._replace(stribeck=None).dry(qd, qd))
+    speeds = drive_speeds(arm, qd)
+    return efforts_at_joints(arm, np.asarray(friction_law(arm)._replace(stribeck=None).dry(speeds, speeds)))
+
+
+def drive_speeds(arm: Arm, qd: Array) -> Array:
+    """Return the speeds (..., n) of the drives, from those of the joints."""
+    return qd if arm.coupling is None else arm.coupling.drives(qd)
+
+
+def efforts_at_joints(arm: Arm, efforts: Array) -> Array:
+    """Return efforts (..., n) at the drives as the joints see them."""
+    return efforts if arm.coupling is None else arm.coupling.joint_efforts(efforts)
 
 
 class _Drive(NamedTuple):
@@ -143,11 +207,15 @@ def _drives(arm: Arm) -> list[_Drive]:
     return [_Drive(motor.inertia, joint_friction_law(motor)) for motor in arm.motors]
 
 
+def _own_effort(drive: _Drive, velocity: Scalar, acceleration: Scalar) -> Scalar:
+    inertial, viscous = drive.inertia * acceleration, drive.friction.viscous * velocity
+    return inertial + viscous + drive.friction.beyond_viscous(velocity, velocity)
+
+
 def _with_drive(
     _: tuple[()], drive: _Drive, effort: Scalar, velocity: Scalar, acceleration: Scalar
 ) -> tuple[tuple[()], Scalar]:
-    inertial, viscous = drive.inertia * acceleration, drive.friction.viscous * velocity
-    return (), effort + (inertial + viscous + drive.friction.beyond_viscous(velocity, velocity))
+    return (), effort + _own_effort(drive, velocity, acceleration)
 
 
 def _less_friction(_: tuple[()], drive: _Drive, velocity: Scalar, effort: Scalar) -> tuple[tuple[()], Scalar]:

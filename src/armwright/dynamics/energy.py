@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
+from armwright.dynamics.drives import drive_rates
 from armwright.dynamics.springs import spring_energy
 from armwright.kinematics.forward_kinematics import link_frames, link_transform
 from armwright.spatial.rotations import exact_cosine, exact_sine
@@ -52,7 +53,8 @@ def _lever(joint: Joint, q: Scalar) -> Vector:
 
 def rotor_energy(arm: Arm, qd: Sequence[Scalar]) -> Scalar:
     """Return the kinetic energy of the rotors, over abstract scalars."""
-    return sum((0.5 * motor.inertia * speed * speed for motor, speed in zip(arm.motors, qd, strict=True)), start=0.0)
+    rotors = zip(arm.motors, drive_rates(arm, qd), strict=True)
+    return sum((0.5 * motor.inertia * speed * speed for motor, speed in rotors), start=0.0)
 
 
 def link_potential_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:

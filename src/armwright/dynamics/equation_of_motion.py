@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array, ArrayLike, read_only, reduce_by_fields
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.dynamics.drives import joint_friction_law
+from armwright.dynamics.drives import drive_rates, drives_at_joints, joint_friction_law
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
     inertia_coefficients,
@@ -20,6 +20,7 @@ from armwright.dynamics.payloads import payload
 from armwright.dynamics.springs import spring_efforts
 from armwright.errors import KindError, shown
 from armwright.kinematics.forward_kinematics import stack
+from armwright.tracing.scalar import Scalar
 
 _NO_LOAD = Link()
 
@@ -120,21 +121,25 @@ def terms(
     derivatives = pose_derivatives(arm, q_)
     D = inertia_coefficients(derivatives)
     h = speed_coefficients(derivatives)
-    motors = list(zip(arm.motors, qd_, qdd_, strict=True))
-    laws = [joint_friction_law(motor) for motor in arm.motors]
+    motors = list(zip(arm.motors, drive_rates(arm, qd_), drive_rates(arm, qdd_), strict=True))
+    laws = [(joint_friction_law(motor), speed) for motor, speed, _ in motors]
+
+    def at_joints(efforts: list[Scalar]) -> Array:
+        return stack(drives_at_joints(arm, efforts), lead)
+
     pairs = [
         [[2.0 * h[i][j][k] * (qd_[j] * qd_[k]) if j < k else 0.0 for k in range(n)] for j in range(n)] for i in range(n)
     ]
     return Terms(
         own=stack([D[i][i] * qdd_[i] for i in range(n)], lead),
         coupling=stack_matrix([[D[i][j] * qdd_[j] if j != i else 0.0 for j in range(n)] for i in range(n)], lead),
-        motor=stack([motor.inertia * acceleration for motor, _, acceleration in motors], lead),
+        motor=at_joints([motor.inertia * acceleration for motor, _, acceleration in motors]),
         centrifugal=stack_matrix([[h[i][j][j] * (qd_[j] * qd_[j]) for j in range(n)] for i in range(n)], lead),
         coriolis=stack([x for plane in pairs for row in plane for x in row], lead).reshape(*lead, n, n, n),
         gravity=stack(gravity_coefficients(arm, derivatives), lead),
-        viscous=stack([motor.viscous * speed for motor, speed, _ in motors], lead),
-        dry=stack([law.dry(speed, speed) for law, speed in zip(laws, qd_, strict=True)], lead),
-        smooth=stack([law.smooth(speed) for law, speed in zip(laws, qd_, strict=True)], lead),
+        viscous=at_joints([motor.viscous * speed for motor, speed, _ in motors]),
+        dry=at_joints([law.dry(speed, speed) for law, speed in laws]),
+        smooth=at_joints([law.smooth(speed) for law, speed in laws]),
         spring=stack([0.0 if effort is None else effort for effort in spring_efforts(arm, q_)], lead),
         load=stack(newton_euler(payload(bare, load.mass, load.com, load.inertia), q_, qd_, qdd_), lead),
         outside=stack(newton_euler(bare, q_, still, still, push), lead),

@@ -121,6 +121,8 @@ def _base_parameters(arm: Arm) -> BaseParameters:
     # Stribeck friction shows at low speeds only.
     low = arm.motor_values("stribeck_speed")
     qd[low > 0, ::2] *= low[low > 0, None]
+    if arm.coupling is not None:
+        qd = arm.coupling.matrix @ qd  # these were the speeds of the drives
     Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_STATES,))
     Y = Y.reshape(-1, parameter_count(arm))
     lengths = np.linalg.norm(Y, axis=0)

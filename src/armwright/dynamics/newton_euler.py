@@ -242,7 +242,8 @@ def inverse_dynamics(
         drives: whether rotor inertia and friction of the drives count.
 
     Returns:
-        tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
+        tau: (..., n) torques [N m] or forces [N] at the joints, positive in the direction of q. Coupled drives give
+        ``arm.coupling.drive_efforts(tau)``.
 
     Raises:
         KindError: ``arm`` is no arm, or an array is something else than real numbers.

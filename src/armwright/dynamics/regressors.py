@@ -11,7 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import Scalars, batch, stack_matrix, weighed
 from armwright.dynamics.bodies import body_of
-from armwright.dynamics.drives import FrictionLaw, joint_friction_law, unit_cube_root_friction
+from armwright.dynamics.drives import FrictionLaw, drive_rates, joint_friction_law, unit_cube_root_friction
 from armwright.dynamics.joint_frames import joint_steps, lever_behind
 from armwright.dynamics.newton_euler import JointMotion, joint_motions, point_accelerations
 from armwright.tracing.scalar import Scalar, select
@@ -23,6 +23,7 @@ _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 # How many parameters a link has, and the parameters of every joint.
 OF_LINK = 10
 _OF_JOINT = ("rotor", "viscous", "forward", "backward")
+_OF_SPRING = ("stiffness", "preload")
 
 
 def regressor(arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
@@ -60,7 +61,7 @@ def dynamic_parameters(arm: Arm) -> Array:
         m, m c_x, m c_y, m c_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz
 
     with the mass m [kg], the centre of mass c in the frame of the link [m], and the inertia tensor I about the origin
-    of that frame, not about c [kg m²]. Behind those of all links, for each joint: the rotor inertia, viscous friction,
+    of that frame, not about c [kg m²]. Behind those of all links, for each drive: the rotor inertia, viscous friction,
     and the magnitudes of Coulomb friction in and against the direction of q, as in ``Motor``. Where any joint of the
     arm has them, each joint has its offset, its Stribeck friction (for its ``stribeck_speed``), its friction by the
     cube root of the velocity, and of its spring the stiffness k and k times the position of rest as well, in this
@@ -144,14 +145,29 @@ def effort_regressor(arm: Arm, q: Scalars, qd: Scalars, qdd: Scalars) -> Matrix:
             turning, moving = apply(transpose(R), w), apply(transpose(R), add(v, cross(w, lever)))
             columns = [dot(moving, force) + dot(turning, moment) for force, moment in wrenches]
             Y[i][OF_LINK * k : OF_LINK * (k + 1)] = columns
-    for i, (motor, *state) in enumerate(zip(arm.motors, q, qd, qdd, strict=True)):
-        first = OF_LINK * n + len(names) * i
-        Y[i][first : first + len(names)] = _joint_columns(motor, state, names)
+    # A drive acts on joint i with weight T_ki, where m' = T q'; its spring is at the joint itself.
+    weights = np.eye(n) if arm.coupling is None else arm.coupling.inverse
+    drives = zip(arm.motors, q, drive_rates(arm, qd), drive_rates(arm, qdd), strict=True)
+    for k, (motor, *state) in enumerate(drives):
+        for name, effort in zip(names, _joint_columns(motor, state, names), strict=True):
+            column = OF_LINK * n + len(names) * k + names.index(name)
+            if name in _OF_SPRING:
+                Y[k][column] = effort
+                continue
+            for i in np.flatnonzero(weights[k]).tolist():
+                weight = float(weights[k, i])
+                Y[i][column] = effort if weight == 1 else weight * effort
     return Y
 
 
 def _joint_columns(motor: Motor, state: Scalars, names: Sequence[str]) -> list[Scalar]:
-    """Return the effort of a joint in a state q, qd, qdd, for a unit of each of its parameters."""
+    """Return the effort of a joint or its drive for a unit of each of its parameters.
+
+    Args:
+        motor: the drive.
+        state: position of the joint, velocity and acceleration of the drive.
+        names: of the parameters.
+    """
     q, qd, qdd = state
     forward, backward = select(qd > 0, 1.0, 0.0), select(qd < 0, -1.0, 0.0)
     known: dict[str, Scalar] = {"rotor": qdd, "viscous": qd, "forward": forward, "backward": backward}

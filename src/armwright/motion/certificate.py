@@ -9,6 +9,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.motion.limited import by_joint, limited_motion
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_lines
 from armwright.spatial.poses import position_text
@@ -37,8 +38,8 @@ class Certificate:
         worst_position: (3,) where the tool was then, seen from the base [m].
         knots: number of poses that were solved.
         samples: how often the tool was sampled in between.
-        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at
-            samples.
+        peaks: of each limit the largest value of all that has limits, (n,) for most arms, see ``Arm.all_limits``:
+            speeds and accelerations exactly, efforts at samples.
         factor: how many times slower the motion is than the speed of the tool has it, 1 for not at all.
         because: which limit, and which joint, from 0, that is for; None where no limit binds.
     """
@@ -103,11 +104,11 @@ class Certificate:
     @property
     def _uses(self) -> list[tuple[LimitName, int, float]]:
         """Of each limit that some joint has: its name, the joint nearest to it, and which part of it that uses."""
-        return [(name, *self.use(name)) for name in LIMITS if np.isfinite(getattr(self.arm.limits, name)).any()]
+        return [(name, *self.use(name)) for name in LIMITS if np.isfinite(getattr(self.arm.all_limits, name)).any()]
 
     def use(self, name: LimitName) -> tuple[int, float]:
-        """Return the joint, from 0, that comes nearest to a limit, and which part of the limit it uses."""
-        parts = self.peaks[name] / getattr(self.arm.limits, name)
+        """Return the joint, from 0, that comes nearest to a limit, itself or its drive, and which part that uses."""
+        parts = by_joint(self.arm, self.peaks[name] / getattr(self.arm.all_limits, name))
         joint = int(parts.argmax())
         return joint, float(parts[joint])
 
@@ -159,9 +160,10 @@ def slower(arm: Arm, factor: float, because: BindingLimit, than: str = "") -> st
 
 def slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, BindingLimit | None]:
     """Return by which factor a motion must be slowed to keep speeds and accelerations, at least 1, and for what."""
+    motion, limits = limited_motion(arm, trajectory), arm.all_limits
     needs: dict[LimitName, Array] = {
-        "speed": trajectory.peaks(1) / arm.limits.speed,
-        "acceleration": np.sqrt(trajectory.peaks(2) / arm.limits.acceleration),
+        "speed": by_joint(arm, motion.peaks(1) / limits.speed),
+        "acceleration": by_joint(arm, np.sqrt(motion.peaks(2) / limits.acceleration)),
     }
     factor, because = 1.0, None
     for name, need in needs.items():

@@ -13,6 +13,7 @@ from armwright.motion.certificate import LIMITS, BindingLimit, Certificate, Limi
 from armwright.motion.deviation import TrackingError
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.knots import segments_at
+from armwright.motion.limited import limited_efforts, limited_motion
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import timed
 from armwright.motion.tolerance import Tolerance
@@ -194,27 +195,28 @@ def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:
         worst_position=solver.forward(q)[:3, 3],
         knots=1,
         samples=0,
-        peaks=dict.fromkeys(LIMITS, np.zeros(solver.arm.n)),
+        peaks=dict.fromkeys(LIMITS, np.zeros(len(solver.arm.all_limits.effort))),
         backward=0.0,
     )
     return CertifiedMotion(trajectory=hold(q, 0.0), certificate=certificate)
 
 
 def limit_peaks(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
-    """Return the largest speeds, accelerations and efforts of a motion, (n,) each; no efforts where none is limited."""
-    return {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2), "effort": _efforts(arm, trajectory)}
+    """Return the largest speeds, accelerations and efforts of all that has limits; no efforts where none is limited."""
+    motion = limited_motion(solver_of(arm).arm, trajectory)
+    return {"speed": motion.peaks(1), "acceleration": motion.peaks(2), "effort": _efforts(arm, trajectory)}
 
 
 def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
-    """Return the largest efforts (n,): at samples, but exactly where they come near a limit."""
+    """Return the largest efforts of all that has limits: at samples, but exactly where they come near a limit."""
     solver = solver_of(arm)
-    limits = solver.arm.limits.effort
+    limits = solver.arm.all_limits.effort
     if not np.isfinite(limits).any():
-        return np.zeros(solver.arm.n)
+        return np.zeros(len(limits))
     m, _, n = trajectory.coefficients.shape
     shape = _SAMPLES + 2 * m + 1, n
     q, qd, qdd = solver.run(_sampled_states, [trajectory.times, trajectory.coefficients], shape, shape, shape)
-    efforts = np.abs(solver.inverse_dynamics(q, qd, qdd)).max(axis=0)
+    efforts = np.abs(limited_efforts(solver.arm, np.asarray(solver.inverse_dynamics(q, qd, qdd)))).max(axis=0)
     return effort_peaks(arm, trajectory).peaks if (efforts > _NEAR * limits).any() else np.asarray(efforts)
 
 
@@ -260,9 +262,9 @@ def _sampled_states(loops: Loops, *tables: Table) -> None:
 
 
 def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:
-    """Return a motion slowed for its efforts, the largest of them (n,), and for which joint, from 0, it is slowed."""
+    """Return a motion slowed for its efforts, the largest of them, and for which joint, from 0, it is slowed."""
     efforts = _efforts(arm, trajectory)
-    if (efforts <= _NEAR * solver_of(arm).arm.limits.effort).all():
+    if (efforts <= _NEAR * solver_of(arm).arm.all_limits.effort).all():
         return trajectory, efforts, None
     try:
         slowing_down = slowing_for_efforts(arm, trajectory)

@@ -22,6 +22,7 @@ from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certified_motion import CertifiedMotion
 from armwright.motion.deviation import curve_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits
+from armwright.motion.limited import limited_efforts, limited_motion
 from armwright.motion.obstruction import PathError
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.straight import certified_line, requested_line
@@ -219,10 +220,10 @@ def _by_via(
 
 def _exceeds_efforts_at_start(solver: Solver, q: Array) -> bool:
     """Whether gravity alone takes more than a joint may give where a motion begins, so that none keeps the efforts."""
-    limits = solver.arm.limits.effort
+    limits = solver.arm.all_limits.effort
     if not np.isfinite(limits).any():
         return False
-    at_rest = np.abs(solver.inverse_dynamics(q, np.zeros(len(q)), np.zeros(len(q))))
+    at_rest = np.abs(limited_efforts(solver.arm, solver.inverse_dynamics(q, np.zeros(len(q)), np.zeros(len(q)))))
     return bool((at_rest > limits * (1 + _ROUNDING)).any())
 
 
@@ -299,8 +300,8 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
         trajectory = xspline(times, configurations)
         times = np.append(0.0, np.cumsum(np.diff(times) * _easing(solver.arm, trajectory)))
     trajectory = xspline(times, configurations)
-    lowest, highest = trajectory.extremes(0)
-    if (lowest < solver.arm.limits.lower).any() or (highest > solver.arm.limits.upper).any():
+    lowest, highest = limited_motion(solver.arm, trajectory).extremes(0)
+    if (lowest < solver.arm.all_limits.lower).any() or (highest > solver.arm.all_limits.upper).any():
         return None
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
     tool = curve_bounds(solver, trajectory).tool

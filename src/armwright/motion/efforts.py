@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.drives import FrictionLaw, coulomb_friction, friction_law
+from armwright.dynamics.drives import FrictionLaw, coulomb_friction, drive_speeds, efforts_at_joints, friction_law
 from armwright.errors import IncapableArmError, KindError, ShapeError, shown
+from armwright.motion.limited import limited_efforts, limited_label
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory
@@ -50,8 +51,9 @@ class EffortPeaks(NamedTuple):
     """The largest efforts of a motion.
 
     Attributes:
-        peaks: (n,) magnitudes [N m] or [N].
-        times: (n,) when [s].
+        peaks: (n,) magnitudes [N m] or [N]; (2 n,) with those of the drives behind, where coupled drives have limits
+            of their own: see ``Arm.all_limits``.
+        times: when [s], of each.
     """
 
     peaks: Array
@@ -63,7 +65,7 @@ class EffortSlowing(NamedTuple):
 
     Attributes:
         factor: times slower; 1 where the efforts are inside their limits as it is.
-        joint: that it is for, from 0; None where no limit binds.
+        joint: that it is for, itself or its drive, from 0; None where no limit binds.
         time: when that joint is at its limit, in the motion as it was given [s].
     """
 
@@ -86,16 +88,18 @@ class _Samples(NamedTuple):
 class _UnevenFriction(NamedTuple):
     """Friction that is no polynomial of the speed: Stribeck's and that by the cube root, at samples with speeds."""
 
+    arm: Arm
     law: FrictionLaw
-    qd: Array
+    speeds: Array
 
     def at(self, u: float) -> Array:
-        """Return it (k, n) at the part u of the speeds."""
-        return np.asarray(uneven_friction(self.law, self.qd * u, self.qd))
+        """Return it, of all that has limits, at the part u of the speeds (k, n) of the drives."""
+        friction = uneven_friction(self.law, self.speeds * u, self.speeds)
+        return limited_efforts(self.arm, efforts_at_joints(self.arm, friction))
 
 
 class _Shares(NamedTuple):
-    """The efforts at k samples by how they change when the motion is slowed, (k, n) each."""
+    """The efforts of all that has limits, at k samples, by how they change when the motion is slowed."""
 
     lasting: Array
     viscous: Array
@@ -150,7 +154,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     """
     solver = solver_of(arm)
     checked(solver.arm, trajectory)
-    limits = solver.arm.limits.effort
+    limits = solver.arm.all_limits.effort
     if not np.isfinite(limits).any():
         return EffortSlowing(1.0, None, 0.0)
     samples = _spread(solver.arm, trajectory)
@@ -160,7 +164,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
         check_lasting(solver.arm, shares.lasting, 1 - _ROUNDING, times, "at {:.3f} s".format)
         part, binding = _largest_part(solver.arm, shares, limits)
         if binding is not None and part < u:
-            u, joint, time = part, binding[1], float(times[binding[0]])
+            u, joint, time = part, binding[1] % solver.arm.n, float(times[binding[0]])
         # What lies between the samples is sampled as well, where the efforts are largest: positions stay when slowed.
         peaks, near = _peaks(solver, trajectory.slowed(1 / u), samples, shares.at(u))
         if (peaks <= limits * (1 + _ROUNDING)).all():
@@ -188,7 +192,7 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
 
     Args:
         arm: the arm, with n joints.
-        lasting: (k, n) efforts by gravity and Coulomb friction.
+        lasting: efforts by gravity and Coulomb friction, at k samples, of all that has limits.
         most: part of the limits.
         at: (k,) times or path parameters of these.
         location: says in words where one of them is on the motion.
@@ -196,15 +200,16 @@ def check_lasting(arm: Arm, lasting: Array, most: float, at: Array, location: Ca
     Raises:
         IncapableArmError: it takes more, with the joint and the effort.
     """
-    use = np.abs(lasting) / arm.limits.effort
+    limits = arm.all_limits.effort
+    use = np.abs(lasting) / limits
     if use.max() > most:
-        k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
-        unit = arm.joints[joint].units.effort
+        k, number = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
+        unit, most_allowed = arm.joints[number % arm.n].units.effort, float(limits[number])
         causes = "gravity, springs" if any(x.spring.stiffness for x in arm.joints) else "gravity"
         raise IncapableArmError(
-            f"{location(float(at[k]))} {causes} and Coulomb friction alone require {abs(lasting[k, joint]):.4g} {unit} "
-            f"of {arm.joint_label(joint)}, {arm.joints[joint].limits.effort:.4g} {unit} are allowed: a slower motion "
-            "is infeasible too"
+            f"{location(float(at[k]))} {causes} and Coulomb friction alone require {abs(lasting[k, number]):.4g} "
+            f"{unit} of {limited_label(arm, number)}, {most_allowed:.4g} {unit} are allowed: a slower motion is "
+            "infeasible too"
         )
 
 
@@ -235,12 +240,12 @@ def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     samples = _Samples(np.repeat(np.arange(m), each), np.tile(parts, m))
     dry = ("coulomb_forward", "coulomb_backward", "stribeck")
     rubs = sum(arm.motor_values(name) for name in dry) > 0
-    speeds = _states(trajectory, samples)[1].reshape(m, each, -1)
+    speeds = drive_speeds(arm, _states(trajectory, samples)[1]).reshape(m, each, -1)
     segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
     low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
     for _ in range(_HALVINGS if len(joint) else 0):
         middle = (low + high) / 2
-        speed = _states(trajectory, _Samples(segment, middle))[1][np.arange(len(joint)), joint]
+        speed = drive_speeds(arm, _states(trajectory, _Samples(segment, middle))[1])[np.arange(len(joint)), joint]
         early = speed * sign > 0
         low, high = np.where(early, middle, low), np.where(early, high, middle)
     return _Samples(np.concatenate([samples.segments, segment, segment]), np.concatenate([samples.parts, low, high]))
@@ -273,21 +278,21 @@ def without_rounding(qd: Array, fastest: float) -> Array:
 
 
 def _efforts(solver: Solver, trajectory: Trajectory, samples: _Samples) -> Array:
-    return np.asarray(solver.inverse_dynamics(*_states(trajectory, samples)))
+    return limited_efforts(solver.arm, np.asarray(solver.inverse_dynamics(*_states(trajectory, samples))))
 
 
 def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Shares:
-    q, qd, qdd = _states(trajectory, samples)
-    lasting = lasting_efforts(solver, q, qd)
-    viscous = qd * solver.arm.motor_values("viscous")
-    law = friction_law(solver.arm)
-    uneven = _UnevenFriction(law, qd) if is_uneven(law) else None
-    dynamic = solver.inverse_dynamics(q, qd, qdd) - lasting - viscous
+    arm, (q, qd, qdd) = solver.arm, _states(trajectory, samples)
+    lasting = limited_efforts(arm, lasting_efforts(solver, q, qd))
+    speeds, law = drive_speeds(arm, qd), friction_law(arm)
+    viscous = limited_efforts(arm, efforts_at_joints(arm, speeds * arm.motor_values("viscous")))
+    uneven = _UnevenFriction(arm, law, speeds) if is_uneven(law) else None
+    dynamic = limited_efforts(arm, np.asarray(solver.inverse_dynamics(q, qd, qdd))) - lasting - viscous
     return _Shares(lasting, viscous, dynamic if uneven is None else dynamic - uneven.at(1.0), uneven)
 
 
 def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array) -> tuple[Array, _Samples]:
-    """Return the largest efforts (n,), and where, from the efforts (k, n) at samples."""
+    """Return the largest efforts, and where, from the efforts (k, ...) of all that has limits at samples."""
     n = tau.shape[1]
     size = np.abs(tau)
     edge = np.full((1, n), -1.0)
@@ -336,7 +341,7 @@ def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tupl
         binding = int(k[worst]), int(j[worst])
         if u < _CRAWL:
             message = f"would have to move {1 / u:.3g} times slower to keep its effort limit"
-            raise IncapableArmError(f"{arm.joint_label(binding[1])} {message}")
+            raise IncapableArmError(f"{limited_label(arm, binding[1])} {message}")
 
 
 def _refined(shares: _Shares, limits: Array, u: float, beyond: float) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit, LimitName, slowing
-from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
+from armwright.motion.certified_motion import limit_peaks
+from armwright.motion.efforts import checked, slowing_for_efforts
+from armwright.motion.limited import by_joint
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory
 
@@ -15,7 +15,7 @@ ROUNDING = 1e-9
 
 
 def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
-    """Return which part of its limits of speed, acceleration and effort each joint uses at most.
+    """Return which part of its limits of speed, acceleration and effort each joint, or its drive, uses at most.
 
     Args:
         arm: the arm, or a compiled one, which is faster.
@@ -31,13 +31,8 @@ def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
     """
     model = solver_of(arm).arm
     checked(model, trajectory)
-    limit = model.limits.effort
-    efforts = effort_peaks(arm, trajectory).peaks if np.isfinite(limit).any() else np.zeros(model.n)
-    return {
-        "speed": trajectory.peaks(1) / model.limits.speed,
-        "acceleration": trajectory.peaks(2) / model.limits.acceleration,
-        "effort": efforts / limit,
-    }
+    uses = {name: peaks / getattr(model.all_limits, name) for name, peaks in limit_peaks(arm, trajectory).items()}
+    return {name: by_joint(model, parts) for name, parts in uses.items()}
 
 
 def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, BindingLimit | None]:

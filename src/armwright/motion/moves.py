@@ -21,6 +21,7 @@ from armwright.motion.certificate import BindingLimit, Certificate
 from armwright.motion.certified_motion import certificate_of, limit_peaks
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.limit_utilization import slowing_for_limits
+from armwright.motion.limited import limited_positions
 from armwright.motion.obstruction import PathError, cause_of
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -124,7 +125,8 @@ def joint_move(
             raise InvalidValueError(
                 "blend: allowed only with times; without times the acceleration limits determine the blends"
             )
-        t, b = blend_timing(q, solver.arm.limits.speed, solver.arm.limits.acceleration, ends=ends)
+        limits = solver.arm.all_limits
+        t, b = blend_timing(limited_positions(solver.arm, q), limits.speed, limits.acceleration, ends=ends)
     else:
         t, b = _timing(times, blend, len(X))
     move = Move(

@@ -15,6 +15,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import singularities
 from armwright.motion.chain import Step, chain, missed, on_one_branch, step_by_step
+from armwright.motion.limited import limited_positions
 from armwright.motion.path import Path
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
@@ -150,9 +151,10 @@ def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) ->
 
 def beyond_limits(arm: Arm, q: Array, times: Array) -> Obstruction | None:
     """Return the first joint limit that configurations (..., k, n) at times (k,) pass; None where they keep them."""
-    if (q >= arm.limits.lower).all() and (q <= arm.limits.upper).all():
+    limits, positions = arm.all_limits, limited_positions(arm, q)
+    if (positions >= limits.lower).all() and (positions <= limits.upper).all():
         return None
-    outside = ((q < arm.limits.lower) | (q > arm.limits.upper)).any(axis=-1)
+    outside = ((positions < limits.lower) | (positions > limits.upper)).any(axis=-1)
     for index in np.argwhere(outside):
         for violation in violations(arm, q[tuple(index)]):
             return Obstruction("limits", float(times[index[-1]]), violation.joint, str(violation))

@@ -21,6 +21,7 @@ from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.deviation import turning_positions
 from armwright.motion.efforts import checked
 from armwright.motion.knots import NOWHERE, rate_or_rest
+from armwright.motion.limited import limited_label, limited_motion, passed_limits
 from armwright.motion.trajectory import Trajectory, hold, join
 
 # By default a joint has its full acceleration after this time [s].
@@ -114,6 +115,7 @@ def retarget(
         return hold(start, 0.0)
     motion = _motion(task, *_phases(task, jerk_limits, synchronised=synchronised, period=period))
     _check_range(task, motion)
+    _check_drives(task, motion)
     return motion
 
 
@@ -298,6 +300,26 @@ def _motion(task: _Task, lengths: Array, jerks: Array, duration: float) -> Traje
 def _after(h: Array, q: Array, qd: Array, qdd: Array, jerk: Array) -> tuple[Array, Array, Array]:
     """Return positions, speeds and accelerations after a time of constant jerk."""
     return q + h * (qd + h * (qdd / 2 + h * jerk / 6)), qd + h * (qdd + h * jerk / 2), qdd + h * jerk
+
+
+def _check_drives(task: _Task, motion: Trajectory) -> None:
+    """Refuse a motion that passes a limit of coupled drives: here each joint is timed by its own limits alone."""
+    arm, n, limits = task.arm, task.arm.n, task.arm.all_limits
+    if len(limits.speed) == n:
+        return
+    of_drives = limited_motion(arm, motion)
+    accelerations, speeds = of_drives.peaks(2), of_drives.peaks(1)
+    rates = ("accelerate by", "s²", accelerations, limits.acceleration), ("move at", "s", speeds, limits.speed)
+    for does, per, peaks, most in rates:
+        for k in np.flatnonzero(peaks[n:] > most[n:] * (1 + _AT_LIMIT)).tolist():
+            beyond = _beyond_limit(arm, k, per, peaks[n + k], most[n + k])
+            raise OnlineError(
+                f"on its motion to the new goal {limited_label(arm, n + k)} of '{arm.name}' would {does} {beyond}: "
+                "joints are timed one by one here; use lower limits of the joints that it moves"
+            )
+    for fault in passed_limits(arm, motion):
+        if fault.drive:
+            raise OnlineError(f"on its motion to the new goal {fault}")
 
 
 def _check_range(task: _Task, motion: Trajectory) -> None:

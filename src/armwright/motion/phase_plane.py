@@ -20,11 +20,12 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.dynamics.drives import coulomb_friction, friction_law
+from armwright.dynamics.drives import coulomb_friction, drive_speeds, efforts_at_joints, friction_law
 from armwright.errors import IncapableArmError
 from armwright.motion.efforts import check_lasting, is_uneven, uneven_friction
 from armwright.motion.forward_backward import UNBOUNDED, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
+from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.motion.solver import Solver
 
 SolverName: TypeAlias = Literal["armwright", "toppra"]
@@ -124,7 +125,7 @@ def fastest(
 
 def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
     """Return by how much the limits are used on every interval (N,), 1 for just, at x (N + 1,)."""
-    arm = solver.arm
+    arm, limits = solver.arm, solver.arm.all_limits
     u = np.diff(x) / (2 * grid.lengths)
     x = x[:-1]
     use = np.zeros(len(x))
@@ -132,9 +133,13 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
         there = np.maximum(x + 2 * part * grid.lengths * u, 0.0)[:, None]
         rate, bend = grid.at(part, 1), grid.at(part, 2)
         qd, qdd = rate * np.sqrt(there), rate * u[:, None] + bend * there
-        uses = [(qd / arm.limits.speed) ** 2, np.abs(qdd) / arm.limits.acceleration]
-        if efforts and number % _EVERY == 0 and np.isfinite(arm.limits.effort).any():
-            uses.append(np.abs(solver.inverse_dynamics(grid.at(part, 0), qd, qdd)) / arm.limits.effort)
+        uses = [
+            (limited_positions(arm, qd) / limits.speed) ** 2,
+            np.abs(limited_positions(arm, qdd)) / limits.acceleration,
+        ]
+        if efforts and number % _EVERY == 0 and np.isfinite(limits.effort).any():
+            tau = np.asarray(solver.inverse_dynamics(grid.at(part, 0), qd, qdd))
+            uses.append(np.abs(limited_efforts(arm, tau)) / limits.effort)
         use = np.maximum(use, np.max(uses, axis=(0, 2)))
     return use
 
@@ -153,31 +158,40 @@ def _rows(
     """
     arm, law = solver.arm, friction_law(solver.arm)
     smooth, fading = law._replace(stribeck=None), law._replace(cube_root=None)
-    speed, acceleration, effort = arm.limits.speed, arm.limits.acceleration, arm.limits.effort
+    speed, acceleration, effort = arm.all_limits.speed, arm.all_limits.acceleration, arm.all_limits.effort
     viscous = arm.motor_values("viscous")
-    # The least and the most that dry friction takes of the joints on the intervals (N, n).
-    frictions = np.stack([coulomb_friction(arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
+
+    def limited(efforts: Array) -> Array:
+        return limited_efforts(arm, np.asarray(efforts))
+
+    def resisted(efforts: Array) -> Array:
+        return limited_efforts(arm, efforts_at_joints(arm, np.asarray(efforts)))
+
+    # The least and the most that dry friction takes of all that has limits on the intervals.
+    frictions = np.stack([limited(coulomb_friction(arm, grid.at(part, 1))) for part in (_EDGE, 0.5, 1 - _EDGE)])
     least, most = frictions.min(axis=0), frictions.max(axis=0)
     limits: list[_Rows] = []
     for part in _PARTS:
         rate, bend = grid.at(part, 1), grid.at(part, 2)
-        ahead = np.broadcast_to((2 * part * grid.lengths)[:, None], rate.shape)
-        none = np.zeros_like(rate)
-        limits.append(_limited(speed**2, _Rows(none, rate**2, none, none, ahead)))
-        limits.append(_limited(acceleration, _Rows(rate, bend, none, none, ahead)))
+        rates, bends = limited_positions(arm, rate), limited_positions(arm, bend)
+        ahead = np.broadcast_to((2 * part * grid.lengths)[:, None], rates.shape)
+        none, still = np.zeros_like(rates), np.zeros_like(rate)
+        limits.append(_limited(speed**2, _Rows(none, rates**2, none, none, ahead)))
+        limits.append(_limited(acceleration, _Rows(rates, bends, none, none, ahead)))
         if efforts and np.isfinite(effort).any():
-            q = grid.at(part, 0)
-            gravity = np.asarray(solver.inverse_dynamics(q, none, none))
-            a = solver.inverse_dynamics(q, none, rate) - gravity
-            b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - coulomb_friction(arm, rate)
-            resisting = viscous * rate
+            q, driven = grid.at(part, 0), drive_speeds(arm, rate)
+            gravity = limited(solver.inverse_dynamics(q, still, still))
+            a = limited(solver.inverse_dynamics(q, still, rate)) - gravity
+            resisting = resisted(viscous * driven)
+            b = limited(solver.inverse_dynamics(q, rate, bend)) - gravity - resisting
+            b = b - limited(coulomb_friction(arm, rate))
             if is_uneven(law):
-                b = b - uneven_friction(law, rate, rate)
+                b = b - resisted(uneven_friction(law, driven, driven))
             if is_uneven(law) and x is not None:
                 # At s' there.
                 there = _speeds(x, part)
-                gravity = gravity + uneven_friction(fading, rate * there, rate)
-                resisting = resisting + uneven_friction(smooth, rate * there, rate) / there
+                gravity = gravity + resisted(uneven_friction(fading, driven * there, driven))
+                resisting = resisting + resisted(uneven_friction(smooth, driven * there, driven)) / there
             lasting = gravity + np.where(gravity > 0, most, least)
             check_lasting(arm, lasting, _ALL, grid.origins, locate)
             # Where a joint reverses on an interval, its dry friction is either; so much less is left on both sides.

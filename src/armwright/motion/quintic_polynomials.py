@@ -11,6 +11,7 @@ from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, joint_array, number
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.knots import NOWHERE, check_duration, two_ends
+from armwright.motion.limited import limited_positions
 from armwright.motion.trajectory import Trajectory, hold
 
 # RLO and VAL count speed in percent of normal; 120 is all the arm allows.
@@ -48,9 +49,9 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
 
 def shortest_duration(arm: Arm, displacement: ArrayLike) -> float:
     """Return the shortest time of a quintic over ``displacement`` (n,) inside the speed and acceleration limits [s]."""
-    displacement = np.abs(joint_array(displacement, arm.n, "displacement"))
-    by_speed: Array = PEAK_SPEED * displacement / arm.limits.speed
-    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * displacement / arm.limits.acceleration)
+    displacement = np.abs(limited_positions(arm, joint_array(displacement, arm.n, "displacement")))
+    by_speed: Array = PEAK_SPEED * displacement / arm.all_limits.speed
+    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * displacement / arm.all_limits.acceleration)
     return float(max(by_speed.max(), by_acceleration.max()))
 
 

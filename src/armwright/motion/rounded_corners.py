@@ -27,6 +27,7 @@ from armwright.motion.certified_motion import CertifiedMotion, certificate_of, j
 from armwright.motion.chain import chain
 from armwright.motion.deviation import farthest_from_legs
 from armwright.motion.efforts import slowing_for_efforts
+from armwright.motion.limited import limited_positions
 from armwright.motion.obstruction import MAX_SLOWDOWN, PathError, check_ends
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.solver import AnyArm, solver_of
@@ -351,11 +352,12 @@ def _inside_efforts(task: _Task, motion: CertifiedMotion) -> CertifiedMotion:
 def _shortest_with_stops(task: _Task) -> float:
     """Return a time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
     solver = solver_of(task.arm)
-    limits = solver.arm.limits.speed, solver.arm.limits.acceleration
+    limits = solver.arm.all_limits.speed, solver.arm.all_limits.acceleration
     q, failed = chain(solver, task.legs.poses, task.q_start)
     if failed is not None or not np.isfinite(limits[1]).all():
         return 0.0
-    by_joints = [shortest_trapezoid(displacement, *limits) for displacement in np.diff(q, axis=0)]
+    steps = np.diff(limited_positions(solver.arm, q), axis=0)
+    by_joints = [shortest_trapezoid(displacement, *limits) for displacement in steps]
     return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
 
 

@@ -13,10 +13,10 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike, integer
 from armwright.errors import IncapableArmError, InvalidValueError, ShapeError, one_of
-from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certificate import LIMITS, LimitName, stretched_peaks
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots
+from armwright.motion.limited import by_joint, limited_efforts, limited_motion, limited_positions, passed_limits
 from armwright.motion.phase_plane import SolverName, fastest
 from armwright.motion.polynomials import composed
 from armwright.motion.rows import on_arrays
@@ -55,9 +55,9 @@ class TimeOptimal:
         duration_before: of the motion that gave the path [s]; None where knots did.
         stops: number of positions on the path at which the arm stands: corners of the path, and rests of a given
             motion.
-        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
-            samples of ``effort_peaks``.
-        bindings: which limit of which joint binds for which share of the time, largest share first.
+        peaks: of each limit the largest value of all that has limits, (n,) for most arms, see ``Arm.all_limits``:
+            speeds and accelerations exactly, efforts at the samples of ``effort_peaks``.
+        bindings: which limit of which joint, or its drive, binds for which share of the time, largest share first.
         factor: how many times slower it is than the run on the grid, so that the limits hold in between as well.
     """
 
@@ -138,9 +138,10 @@ def time_optimal(
         grid = gridded(solver.arm, piece, math.ceil(intervals * piece.path.duration / total))
         runs.append(_composed(grid, fastest(solver, grid, piece.rests, locate, efforts=efforts, method=method)))
     run = join(runs) if runs else hold(geometry(0.0), 0.0)
-    speeds, accelerations = run.peaks(1), run.peaks(2)
-    by_acceleration = math.sqrt(float((accelerations / solver.arm.limits.acceleration).max()))
-    factor = max(1.0, float((speeds / solver.arm.limits.speed).max()), by_acceleration)
+    limited, limits = limited_motion(solver.arm, run), solver.arm.all_limits
+    speeds, accelerations = limited.peaks(1), limited.peaks(2)
+    by_acceleration = math.sqrt(float((accelerations / limits.acceleration).max()))
+    factor = max(1.0, float((speeds / limits.speed).max()), by_acceleration)
     if efforts:
         factor *= slowing_for_efforts(arm, run.slowed(factor)).factor
     run = run.slowed(factor)
@@ -175,11 +176,12 @@ def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Calla
 
 def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
     """Refuse a path that leaves the range of a joint, and joints that nothing limits."""
-    for extreme in path.extremes(0):
-        for fault in violations(arm, extreme):
-            raise InvalidValueError(f"path: {fault}")
+    for fault in passed_limits(arm, path):
+        raise InvalidValueError(f"path: {fault}")
     counting = LIMITS if efforts else LIMITS[:2]
-    limited = np.any([np.isfinite(getattr(arm.limits, name)) for name in counting if name != "speed"], axis=0)
+    limited = np.any([np.isfinite(getattr(arm.all_limits, name)) for name in counting if name != "speed"], axis=0)
+    if arm.coupling is not None and len(limited) > arm.n:  # a limit of a drive is one of all joints that it moves
+        limited = limited[: arm.n] | (limited[arm.n :, None] & (arm.coupling.inverse != 0)).any(axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise IncapableArmError(
             f"arm '{arm.name}': {arm.joint_label(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so "
@@ -199,10 +201,11 @@ def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Bindin
     """Return which limits bind, by looking at the motion at even times."""
     t = (np.arange(_LOOKS) + 0.5) / _LOOKS * run.duration
     states = run(t), run(t, 1), run(t, 2)
-    values = {"speed": states[1], "acceleration": states[2]}
+    arm = solver.arm
+    values = {"speed": limited_positions(arm, states[1]), "acceleration": limited_positions(arm, states[2])}
     if efforts:
-        values["effort"] = np.asarray(solver.inverse_dynamics(*states))
-    uses = np.stack([np.abs(values[name]) / getattr(solver.arm.limits, name) for name in values], axis=1)
+        values["effort"] = limited_efforts(arm, np.asarray(solver.inverse_dynamics(*states)))
+    uses = np.stack([by_joint(arm, np.abs(values[name]) / getattr(arm.all_limits, name)) for name in values], axis=1)
     flat = uses.reshape(_LOOKS, -1)
     counts = np.bincount(flat.argmax(axis=1)[flat.max(axis=1) >= _BINDS], minlength=flat.shape[1])
     return tuple(

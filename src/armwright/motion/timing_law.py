@@ -20,10 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.certificate import BindingLimit
 from armwright.motion.forward_backward import Bounds, Nothing, largest_squares, write_largest_squares
 from armwright.motion.knots import segments_at
+from armwright.motion.limited import limited_motion
 from armwright.motion.polynomials import composed_peaks, crossing, shifted_terms
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
@@ -61,8 +63,8 @@ class TimedPath(NamedTuple):
         factor: how many times longer it takes than a run at full speed that no joint limits.
         because: which limit, and which joint, from 0, binds longest; None where the joints do not slow it.
         run: before it was slowed by the same factor throughout.
-        speed: (n,) largest speeds of the joints.
-        acceleration: (n,) largest accelerations.
+        speed: largest speeds of all that has limits, (n,) for most arms: see ``Arm.all_limits``.
+        acceleration: largest accelerations of these.
     """
 
     trajectory: Trajectory
@@ -92,7 +94,7 @@ class _Grid(NamedTuple):
     Attributes:
         solver: the arm.
         times: (m + 1,) the parameters s of the path where m intervals begin, and the last one ends.
-        cubics: (m, 4, n) the joints on each.
+        cubics: (m, 4, n) the joints on each, and behind them the drives that have limits: n is the number of both.
         caps: (m,) the largest s' on each.
         a: (m, rows) bounds |a u + b x| <= 1 on each, of x = s'² at its start and u = s'', that hold all along it.
         b: (m, rows) the same.
@@ -152,19 +154,20 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
         path: cubics with continuous second derivatives.
         caps: (m,) the largest s' on each of its m segments.
     """
-    arm, grid = solver.arm, _gridded(solver, path, caps)
+    arm, limits = solver.arm, solver.arm.all_limits
+    grid = _gridded(solver, limited_motion(arm, path), caps)
     run = _smooth(grid)
     terms, speed, acceleration = composed_peaks(grid.cubics, run.law, run.intervals, run.times, solver.run)
     over = max(
-        float((speed / arm.limits.speed).max()),
-        math.sqrt(float((acceleration / arm.limits.acceleration).max())),
+        float((speed / limits.speed).max()),
+        math.sqrt(float((acceleration / limits.acceleration).max())),
         float(run.along.max()),
         grid.allowed / float(run.times[-1]),
     )
     terms *= (over ** -np.arange(terms.shape[1], dtype=np.float64))[:, None]
-    trajectory = Trajectory.of_planner(run.times * over, terms)
+    trajectory = Trajectory.of_planner(run.times * over, terms if len(speed) == arm.n else terms[:, :, : arm.n].copy())
     factor = trajectory.duration / _allowed(grid.even + _RAMP)
-    because = _binding(arm.n, run) if factor > 1 else None
+    because = _binding(arm, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, run, speed / over, acceleration / over**2)
 
 
@@ -175,7 +178,7 @@ def _allowed(shortest: float) -> float:
 
 def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
     """Return a path with every segment cut into equal parts."""
-    limits = solver.arm.limits
+    limits = solver.arm.all_limits
     m, _, n = path.coefficients.shape
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
     ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
@@ -275,7 +278,7 @@ def _averaged(grid: _Grid, squares: Array, window: float) -> _Run:
         squares: (m + 1,) s'² at the ends of its intervals; s'' is constant on each.
         window: [s].
     """
-    limits = grid.solver.arm.limits
+    limits = grid.solver.arm.all_limits
     m, _, n = grid.cubics.shape
     inputs = [grid.times, grid.cubics, grid.caps, limits.speed, limits.acceleration, squares, np.array([window])]
     # As many pieces as there may be: each interval begins and ends in the window, and begins once more.
@@ -422,14 +425,15 @@ def _passed(loops: Loops, law: list[Scalar], length: Scalar, knot: Scalar) -> Sc
     return crossing(loops, value_and_rate, (0.0 * length, length), length / 2, tolerance=_CONVERGED * length)
 
 
-def _binding(joints: int, run: _Run) -> BindingLimit:
-    """Return which limit of which joint binds for the longest time."""
+def _binding(arm: Arm, run: _Run) -> BindingLimit:
+    """Return which limit of which joint, or of its drive, binds for the longest time."""
     steps, of_joints = run.times[1:] - run.times[:-1], run.of_joints
     most = of_joints.max(axis=1)
     long = np.where(most >= _BINDS * most.max(), steps, 0.0)
-    counts = np.bincount(of_joints.argmax(axis=1), weights=long, minlength=2 * joints)
-    name, joint = divmod(int(counts.argmax()), joints)
-    return ("acceleration" if name else "speed"), joint
+    limited = of_joints.shape[1] // 2
+    counts = np.bincount(of_joints.argmax(axis=1), weights=long, minlength=2 * limited)
+    name, number = divmod(int(counts.argmax()), limited)
+    return ("acceleration" if name else "speed"), number % arm.n
 
 
 def _apart(loops: Loops, first: Table, second: Table) -> tuple[Table, Scalar]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.motion.obstruction import beyond_limits
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.clearance import ClearanceChecker, resolution
 from armwright.physics.configuration_checks import ConfigurationChecks, Meeting
@@ -91,6 +92,9 @@ class JointSpace:
 
     def is_free(self, q: Array) -> bool:
         """Whether all of several configurations (k, n) are free; False where no more may be checked."""
+        # Joints are kept within their limits by who asks; of coupled drives they do not know.
+        if self.arm.coupling is not None and beyond_limits(self.arm, q, np.zeros(len(q))) is not None:
+            return False
         inner = ~(np.abs(q[:, None] - self._ends).max(axis=2, initial=0.0) < _SAME).any(axis=1)
         looked_at = q[inner][: self.left]
         meeting = self._checks.first_meeting(self._at(looked_at), self._margins) if len(looked_at) else None

@@ -51,13 +51,15 @@ class Log:
         """
         self._cell, self._parts = cell, tuple(world.parts)
         # Of the arrays of the world what belongs to arms, or stands before it.
-        kinds = zip(*((*arm.indices, fingers[name]) for name, arm in arms.items()), strict=True)
+        kinds = zip(*((*arm.indices[:3], fingers[name]) for name, arm in arms.items()), strict=True)
         positions, speeds, motors, others = (max(int(x.max(initial=-1)) for x in kind) + 1 for kind in kinds)
         positions = max(positions, others)
         ends = np.cumsum([0, positions, speeds, motors]).tolist()
         self._used = slice(positions), slice(speeds), slice(motors)
         self._written = tuple(slice(first, last) for first, last in pairwise(ends))
         self._columns: dict[str, _Columns] = {}
+        # Motors of coupled drives are recorded as they pull; what is read is what that is at the joints.
+        self._couplings = {name: arm.arm.coupling for name, arm in arms.items() if arm.reads_exactly}
         width = ends[-1]
         for name, arm in arms.items():
             i = arm.indices
@@ -128,7 +130,8 @@ class Log:
         # Another thread may fill the latest block meanwhile, and put it behind the others.
         latest, full = self._rows, self._full
         values = full[block][row] if block < len(full) else latest[row]
-        return Measured(*(values[columns] for columns in self._columns[arm][:-1]))
+        measured = Measured(*(values[columns] for columns in self._columns[arm][:-1]))
+        return measured._replace(tau=self._at_joints(arm, measured.tau))
 
     def part_pose(self, part: str, time: float) -> Array:
         """Return the pose (4, 4) of a part in the world at a time [s] that has been recorded."""
@@ -149,11 +152,15 @@ class Log:
             t=np.arange(self._count, dtype=np.float64) * self._cell.period,
             q=rows[:, columns.q],
             qd=rows[:, columns.qd],
-            tau=rows[:, columns.tau],
+            tau=self._at_joints(name, rows[:, columns.tau]),
             sent=np.concatenate([it.positions(*ticks) for (_, it), ticks in zip(sent, pairwise(changes), strict=True)]),
             actual=rows[:, columns.actual],
             opening=rows[:, columns.fingers].sum(axis=1),
         )
+
+    def _at_joints(self, arm: str, tau: Array) -> Array:
+        coupling = self._couplings.get(arm)
+        return tau if coupling is None else coupling.joint_efforts(tau)
 
     def tracks(self) -> dict[str, PartTrack]:
         """Return where the parts were."""

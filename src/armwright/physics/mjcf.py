@@ -140,6 +140,8 @@ def _lost_of_arm(arm: Arm, spec: Any, plant: PlantArm) -> list[str]:
         if math.isfinite(joint.limits.speed):
             speed = f"{joint.limits.speed:g} {joint.units.position}/s"
             lost.append(f"{arm.joint_label(i)}: the maximum speed, {speed}, is not in the file")
+    if arm.coupling is not None and arm.coupling.limits:
+        lost.append("of the limits of the drives, those of speed and acceleration are not in the file")
     lost += lost_beside_joints(arm)
     changed = [inertia for inertia in plant.inertias if inertia.changed]
     for inertia in changed:

@@ -23,6 +23,7 @@ _JOINT = (
     *("type", "pos", "axis", "ref", "limited", "range", "armature", "damping", "frictionloss", "stiffness"),
     *("springref", "actuatorfrcrange"),
 )
+_TENDON = ("limited", "range", "armature", "damping", "frictionloss")
 _GEOM = (
     *("type", "size", "pos", "quat", "mass", "contype", "conaffinity", "condim", "friction", "priority"),
     *("margin", "gap", "solref", "solimp", "adhesion", "group", "rgba"),
@@ -59,6 +60,7 @@ def spec_text(spec: Any, name: str, comment: Iterable[str], rename: Rename = lam
         element.set("vertex", _numbers(np.array(mesh.uservert)))
         element.set("face", _numbers(np.array(mesh.userface)))
     _add_body(SubElement(root, "worldbody"), spec.worldbody, rename, mujoco)
+    _add_tendons(root, spec, rename, mujoco)
     _add_actuators(root, spec, rename, mujoco)
     _add_couplings(root, spec, rename, mujoco)
     _add_pairs(root, spec, rename, mujoco)
@@ -99,6 +101,19 @@ def _add_body(element: Element, body: Any, rename: Rename, mujoco: Any) -> None:
         own = _named(element, "body", "body", child, rename)
         _set(own, child, plain, ("pos", "quat", "gravcomp"), mujoco)
         _add_body(own, child, rename, mujoco)
+
+
+def _add_tendons(root: Element, spec: Any, rename: Rename, mujoco: Any) -> None:
+    """Write the tendons, all of which are sums of joints."""
+    if not spec.tendons:
+        return
+    tendons, plain = SubElement(root, "tendon"), mujoco.MjSpec().add_tendon()
+    for tendon in spec.tendons:
+        element = _named(tendons, "fixed", "tendon", tendon, rename)
+        _set(element, tendon, plain, _TENDON, mujoco)
+        for wrap in tendon.path:
+            joint = rename("joint", wrap.target.name)
+            SubElement(element, "joint", joint=joint, coef=_numbers(np.atleast_1d(wrap.coef)))
 
 
 def _add_actuators(root: Element, spec: Any, rename: Rename, mujoco: Any) -> None:

@@ -13,7 +13,10 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.drive import Motor
+from armwright.arm.losses import mean_dry_friction
+from armwright.arm.mjcf.drives import NO_LIMIT
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
@@ -77,11 +80,19 @@ class PlantArm:
 
 
 class ArmIndices(NamedTuple):
-    """Where the numbers of an arm stand in the arrays of a compiled world, (n,) each."""
+    """Where the numbers of an arm stand in the arrays of a compiled world, (n,) each.
+
+    Attributes:
+        positions: of the joints.
+        speeds: of the joints.
+        motors: of the drives.
+        tendons: of the drives; -1 of one that moves as its joint does.
+    """
 
     positions: npt.NDArray[np.intp]
     speeds: npt.NDArray[np.intp]
     motors: npt.NDArray[np.intp]
+    tendons: npt.NDArray[np.intp]
 
 
 def new_world(gravity: Array, timestep: float) -> Any:
@@ -117,6 +128,9 @@ def finish(spec: Any, arms: tuple[PlantArm, ...]) -> Any:
 def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] = (), **geoms: Any) -> PlantArm:
     """Add an arm to a world: bodies ``NAME/link1``, joints ``NAME/joint1``, motors ``NAME/motor1``, body ``NAME/tool``.
 
+    A drive that does not move as a joint does is a tendon ``NAME/drive1`` of the joints: its length is the position of
+    the drive. The motor pulls there, and there are inertia, friction and limits of the drive.
+
     Args:
         spec: of the world.
         name: of the arm.
@@ -134,20 +148,21 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
     frames = link_poses(arm, np.zeros(arm.n))
     body = spec.worldbody.add_body(name=f"{name}/base", **placement(base))
     links = [body]
-    behind, inertias = np.eye(4), []
+    behind, inertias, at_joints = np.eye(4), [], drives_at_joints(arm)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         body = body.add_body(name=f"{name}/link{i}", **placement(inverse(behind) @ frames[i]))
         inertias.append(_set_inertia(body, link))
-        _add_joint(body, f"{name}/joint{i}", joint, motor, inverse(frames[i]) @ frames[i - 1])
-        motor_of_joint = spec.add_actuator(
-            name=f"{name}/motor{i}", target=f"{name}/joint{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT
-        )
-        motor_of_joint.set_to_motor()
-        if np.isfinite(joint.limits.effort):
-            motor_of_joint.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-            motor_of_joint.forcerange = (-joint.limits.effort, joint.limits.effort)
+        own = motor if i - 1 in at_joints else Motor()
+        added = _add_joint(body, f"{name}/joint{i}", joint, own, inverse(frames[i]) @ frames[i - 1])
+        if arm.coupling is None:
+            _add_motor(spec, f"{name}/motor{i}", added, joint.limits.effort)
+        elif np.isfinite(joint.limits.effort):
+            added.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            added.actfrcrange = (-joint.limits.effort, joint.limits.effort)
         links.append(body)
         behind = frames[i]
+    if arm.coupling is not None:
+        _add_drives(spec, name, arm, arm.coupling)
     tool = body.add_body(name=f"{name}/tool", **placement(inverse(behind) @ frames[arm.n + 1]))
     tool.add_site(name=f"{name}/tool")
     for number, it in enumerate(bodies, 1):
@@ -156,6 +171,42 @@ def add_arm(spec: Any, name: str, arm: Arm, base: Array, bodies: Iterable[Body] 
         label = f"link{it.link}" if it.link else "base"
         add_geom(spec, links[it.link], f"{name}/{label}/solid{number}", solid, mass=0.0, **geoms)
     return PlantArm(name=name, arm=arm, tool=tool, inertias=tuple(inertias))
+
+
+def drives_at_joints(arm: Arm) -> frozenset[int]:
+    """Return the drives, from 0, that move as their joints do."""
+    if arm.coupling is None:
+        return frozenset(range(arm.n))
+    return frozenset(np.flatnonzero((arm.coupling.inverse == np.eye(arm.n)).all(axis=1)).tolist())
+
+
+def _add_drives(spec: Any, name: str, arm: Arm, coupling: Coupling) -> None:
+    """Add the motors of coupled drives, and a tendon for each drive that needs one."""
+    mujoco = load_mujoco()
+    at_joints, own = drives_at_joints(arm), coupling.drive_limits
+    for i, (motor, weights) in enumerate(zip(arm.motors, coupling.inverse, strict=True)):
+        pulled, ends = spec.joint(f"{name}/joint{i + 1}"), np.array((own.lower[i], own.upper[i]))
+        if i not in at_joints or np.isfinite(ends).any():
+            tendon = spec.add_tendon(name=f"{name}/drive{i + 1}")
+            for j in np.flatnonzero(weights).tolist():
+                tendon.wrap_joint(f"{name}/joint{j + 1}", float(weights[j]))
+            if i not in at_joints:
+                pulled, tendon.armature = tendon, motor.inertia
+                tendon.damping, tendon.frictionloss = [motor.viscous, 0.0, 0.0], mean_dry_friction(motor)
+            if np.isfinite(ends).any():
+                tendon.limited, tendon.range = mujoco.mjtLimited.mjLIMITED_TRUE, np.clip(ends, -NO_LIMIT, NO_LIMIT)
+        _add_motor(spec, f"{name}/motor{i + 1}", pulled, float(own.effort[i]))
+
+
+def _add_motor(spec: Any, name: str, pulled: Any, effort: float) -> None:
+    """Add the motor of a joint or a tendon, with its largest effort."""
+    mujoco = load_mujoco()
+    kinds = mujoco.mjtTrn
+    kind = kinds.mjTRN_JOINT if isinstance(pulled, mujoco.MjsJoint) else kinds.mjTRN_TENDON
+    motor = spec.add_actuator(name=name, target=pulled.name, trntype=kind)
+    motor.set_to_motor()
+    if np.isfinite(effort):
+        motor.forcelimited, motor.forcerange = mujoco.mjtLimited.mjLIMITED_TRUE, (-effort, effort)
 
 
 def _set_inertia(body: Any, link: Link) -> Inertia:
@@ -171,8 +222,8 @@ def _set_inertia(body: Any, link: Link) -> Inertia:
     return Inertia(body.name, link.mass, moments, padded)
 
 
-def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) -> None:
-    """Add the joint before a link.
+def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) -> Any:
+    """Add the joint before a link, and return it.
 
     Args:
         body: of the link.
@@ -191,21 +242,25 @@ def _add_joint(body: Any, name: str, joint: Joint, motor: Motor, before: Array) 
         armature=motor.inertia,
         damping=[motor.viscous, 0.0, 0.0],
         # The part that both directions share; ``friction`` has the rest.
-        frictionloss=(motor.coulomb_forward + motor.coulomb_backward) / 2,
+        frictionloss=mean_dry_friction(motor),
     )
     if joint.spring.stiffness:
         added.stiffness, added.springref = [joint.spring.stiffness, 0.0, 0.0], joint.spring.rest
     if np.isfinite((limits.lower, limits.upper)).all():
         added.limited, added.range = mujoco.mjtLimited.mjLIMITED_TRUE, (limits.lower, limits.upper)
+    return added
 
 
 def arm_indices(model: Any, name: str, n: int) -> ArmIndices:
     """Return where the n joints of an arm stand in a compiled world."""
     joints = [model.joint(f"{name}/joint{i}") for i in range(1, n + 1)]
+    motors = [model.actuator(f"{name}/motor{i}") for i in range(1, n + 1)]
+    pulls = [motor.trntype[0] == load_mujoco().mjtTrn.mjTRN_TENDON for motor in motors]
     return ArmIndices(
         positions=np.array([joint.qposadr[0] for joint in joints], dtype=np.intp),
         speeds=np.array([joint.dofadr[0] for joint in joints], dtype=np.intp),
-        motors=np.array([model.actuator(f"{name}/motor{i}").id for i in range(1, n + 1)], dtype=np.intp),
+        motors=np.array([motor.id for motor in motors], dtype=np.intp),
+        tendons=np.array([m.trnid[0] if p else -1 for m, p in zip(motors, pulls, strict=True)], dtype=np.intp),
     )
 
 

@@ -16,7 +16,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, exact_shape
 from armwright.cell.control import Sensors, Servo
 from armwright.compiled.arm import compile_arm
-from armwright.dynamics.drives import friction_law
+from armwright.dynamics.drives import drive_speeds, efforts_at_joints, friction_law
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.friction import constant_efforts, dry_offsets
 from armwright.physics.plant import ArmIndices
@@ -109,7 +109,7 @@ class Measured(NamedTuple):
     Attributes:
         q: joint positions, as the sensors read them.
         qd: joint speeds, as the sensors read them.
-        tau: efforts of the motors.
+        tau: efforts of the motors, at the joints.
         actual: joint positions, as they are.
     """
 
@@ -161,6 +161,7 @@ class ArmServo:
         # Noise is a part of the largest efforts; there is none of those that are not known.
         self.finite_effort = np.where(np.isfinite(effort), effort, 0.0)
         self._limits = np.minimum(effort, LARGEST)
+        self._coupling = arm.coupling
         w = settings.bandwidth
         self._gains = np.array([w**2, 2 * w, _INTEGRAL * w**3 if settings.integral else 0.0])
         self._commanded, self._limited, self._carrying = (_kernel(it, arm.n) for it in (_command, _limit, _carry))
@@ -191,7 +192,7 @@ class ArmServo:
             reference: where the joints are sent: the fields (4, n) of a ``Reference``.
 
         Returns:
-            Positions and speeds (n,) as the sensors read them, and the efforts (n,) of the motors.
+            Positions and speeds (n,) as the sensors read them, and the efforts (n,) of the motors, at the joints.
         """
         q, qd = self._read(data.qpos[self.indices.positions], data)
         if self._law is not None:
@@ -210,7 +211,12 @@ class ArmServo:
             tau, sums = self._limited(tau, reference, self._limits, self._sums, errors, self._tick)
             if not self.leaning:
                 self._sums = sums
-        data.ctrl[self.indices.motors] = tau
+        if self._coupling is None:
+            data.ctrl[self.indices.motors] = tau
+        else:
+            most = self._coupling.drive_limits.effort
+            efforts = np.clip(self._coupling.drive_efforts(tau), -most, most)
+            data.ctrl[self.indices.motors], tau = efforts, self._coupling.joint_efforts(efforts)
         return q, qd, tau
 
     def _load(self) -> Array:
@@ -231,9 +237,11 @@ class ArmServo:
 
     def friction(self, qd: Array) -> Array:
         """Return the friction (k, n) of the believed arm at speeds (k, n) of its reference, but the viscous one."""
+        qd = drive_speeds(self.arm, qd)
         direction, fading = np.tanh(qd / _MOVING), self._friction_law.fading(qd)
         dry = self._dry if fading is None else self._dry + fading
-        return np.asarray(dry * direction + self._lean * np.abs(direction) + self._friction_law.smooth(qd))
+        friction = dry * direction + self._lean * np.abs(direction) + self._friction_law.smooth(qd)
+        return efforts_at_joints(self.arm, np.asarray(friction))
 
     def configuration(self, data: Any) -> Array:
         """Return the joint positions (n,) as the sensors read them at the latest tick."""
@@ -246,7 +254,9 @@ class ArmServo:
         if self._sensors.exact:
             return q, data.qvel[self.indices.speeds]
         if self._count is not None:
+            q = drive_speeds(self.arm, q)
             q = np.round(q / self._count) * self._count
+            q = q if self._coupling is None else self._coupling.joints(q)
         keep = self._sensors.delay + 2
         self._readings = (*self._readings, q)[-keep:]
         latest, before = self._latest(), self._readings[0]

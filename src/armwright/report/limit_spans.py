@@ -6,7 +6,7 @@ from typing import Literal
 import attrs
 import numpy as np
 
-from armwright.arm.model import JointLimits
+from armwright.arm.limits import JointLimits
 from armwright.arrays import Array
 
 LimitKind = Literal["position", "speed", "acceleration", "effort"]

@@ -11,7 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_or_each
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.drives import friction_law
+from armwright.dynamics.drives import drive_speeds, efforts_at_joints, friction_law
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares
 from armwright.dynamics.springs import with_springs
@@ -116,12 +116,16 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
     stiffness, damping = _gains(arm, kp, "kp"), _gains(arm, kd, "kd")
     inertia, law = arm.motor_values("inertia"), friction_law(arm)
 
+    def own_efforts(acceleration: Array, speed: Array, wanted: Array) -> Array:
+        return np.asarray(inertia * acceleration + law.viscous * speed + law.beyond_viscous(wanted, wanted))
+
     def efforts(t: float, q: Array, qd: Array) -> Array:
         speed = reference(t, 1)
         acceleration = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
         position = q.tolist()
         links = np.array(with_springs(arm, newton_euler(arm, position, qd.tolist(), acceleration.tolist()), position))
-        return np.asarray(links + (inertia * acceleration + law.viscous * qd + law.beyond_viscous(speed, speed)))
+        at_drives = (drive_speeds(arm, x) for x in (acceleration, qd, speed))
+        return links + efforts_at_joints(arm, np.asarray(own_efforts(*at_drives)))
 
     return efforts
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.compiled.arm import CompiledArm, compile_arm
-from armwright.dynamics.drives import FrictionLaw, friction_law
+from armwright.dynamics.drives import FrictionLaw, drive_speeds, efforts_at_joints, friction_law
 from armwright.simulation.complementarity import solve_complementarity
 from armwright.simulation.controllers import Controller
 from armwright.simulation.result import Brake, JointState
@@ -84,7 +84,8 @@ class Plant:
         brakes: which are on, and when.
         lower: (n,) where the lower stops are; minus infinity where there is none.
         upper: (n,) where the upper stops are.
-        effort: (n,) largest efforts of the drives.
+        effort: (n,) largest efforts at the joints.
+        drive_effort: (n,) largest efforts of the drives where these are coupled.
     """
 
     arm: Arm
@@ -93,6 +94,7 @@ class Plant:
     lower: Array
     upper: Array
     effort: Array
+    drive_effort: Array
 
     @cached_property
     def compiled(self) -> CompiledArm:
@@ -137,7 +139,14 @@ class Plant:
         M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
         law = self.law
-        friction = np.where(locked, 0.0 - self.offset, -law.viscous * qd - law.beyond_viscous(qd, direction))
+        if self.arm.coupling is None:
+            friction = np.where(locked, 0.0 - self.offset, -law.viscous * qd - law.beyond_viscous(qd, direction))
+        else:
+            # Coupled drives have no dry friction here, which alone would ask for their directions.
+            most, speeds = self.drive_effort, drive_speeds(self.arm, qd)
+            efforts = np.clip(self.arm.coupling.drive_efforts(tau), -most, most)
+            tau = efforts_at_joints(self.arm, efforts)
+            friction = -efforts_at_joints(self.arm, law.viscous * speeds + law.smooth(speeds))
         return M, tau, friction, tau + friction - bias
 
     def braked(self, t: float) -> Flags:

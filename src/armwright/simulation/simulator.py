@@ -16,13 +16,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import LARGEST_ANGLE, Array, ArrayLike, exact_shape, one_per_joint, positive
 from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
-from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.errors import InvalidValueError, KindError, ShapeError, UnsupportedArmError, shown
 from armwright.simulation.controllers import Controller, no_effort
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.simulation.plant import Moment, Phase, Plant, Start
@@ -98,6 +99,7 @@ def simulate(
         lower=arm.limits.lower if stops else -unlimited,
         upper=arm.limits.upper if stops else unlimited,
         effort=arm.limits.effort if saturation else unlimited,
+        drive_effort=arm.coupling.drive_limits.effort if saturation and arm.coupling is not None else unlimited,
     )
     _check(plant, start, speed)
     run = _Run(plant, integrator, duration, period)
@@ -135,6 +137,8 @@ def _held_to_shape(controller: Controller, n: int) -> Controller:
 def _check(plant: Plant, q: Array, qd: Array) -> None:
     """Refuse a start outside the stops, a brake without a joint, a controller that drives another arm."""
     arm = plant.arm
+    if arm.coupling is not None:
+        _refuse_held_drives(arm, arm.coupling, plant.brakes)
     for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
         units = arm.joints[i].units
         unit = units.display
@@ -276,4 +280,33 @@ class _Run:
             heat=states[:, 3 * n :],
             impact=np.array([sample.impact for sample in self._samples]),
             events=tuple(self._events),
+        )
+
+
+def _refuse_held_drives(arm: Arm, coupling: Coupling, brakes: Sequence[Brake]) -> None:
+    """Refuse what holds coupled drives and not joints: dry friction, brakes, and position limits of the drives.
+
+    Raises:
+        UnsupportedArmError: there is some.
+    """
+    dry = ("coulomb_forward", "coulomb_backward", "stribeck")
+    rubs = np.any([arm.motor_values(name) > 0 for name in dry], axis=0)
+    if rubs.any():
+        raise UnsupportedArmError(
+            f"arm '{arm.name}' has coupled drives, and that of {arm.joint_label(int(np.argmax(rubs)))} has dry "
+            "friction, which holds drives and not joints; this simulation has dry friction of joints only. Omit it, or "
+            "run the arm in a cell with physics (armwright run --physics)"
+        )
+    held = [brake.joint for brake in brakes if brake.joint in coupling.mixed]
+    if held:
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': the drive of {arm.joint_label(held[0])} is coupled, so that a brake would hold the "
+            "drive and not the joint; this simulation has brakes of joints only. Omit it"
+        )
+    ends = np.isfinite([coupling.drive_limits.lower, coupling.drive_limits.upper]).any(axis=0)
+    if ends.any():
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': the drive of {arm.joint_label(int(np.argmax(ends)))} has position limits of its own; "
+            "this simulation has stops of joints only. Omit them, or run the arm in a cell with physics "
+            "(armwright run --physics)"
         )

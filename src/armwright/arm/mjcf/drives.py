@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import Limits
+from armwright.arm.limits import Limits
 from armwright.files.limits import limit
 from armwright.mujoco_library import load_mujoco
 

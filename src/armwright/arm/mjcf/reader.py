@@ -31,7 +31,8 @@ def load_mjcf(path: Path | str, *, base: str | None = None, tip: str | None = No
         tip: name of the body or site that is the tool; when left out the only one at the end of moving joints, or the
             body that carries all of them.
         lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
-            are held by their names [rad] or [m].
+            are held by their names [rad] or [m]. Others beside the chain are held at 0, or in the middle if their
+            limits exclude 0.
 
     Raises:
         KindError: ``path`` is no path, ``lock`` one text, or a position no number.

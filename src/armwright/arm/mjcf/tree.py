@@ -15,10 +15,11 @@ import attrs
 import numpy as np
 
 from armwright.arm.drive import Motor, Spring
+from armwright.arm.limits import Limits
 from armwright.arm.mjcf.couplings import couplings
 from armwright.arm.mjcf.drives import limits_of, motor_of, spring_of
 from armwright.arm.mjcf.solids import ellipsoids_of, pose_of, solids_of
-from armwright.arm.model import Limits, Link
+from armwright.arm.model import Link
 from armwright.arm.tree.kinematic_tree import check_lock, quoted
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, one_of
@@ -103,6 +104,20 @@ class MjcfJoint:
     def spring(self) -> tuple[Spring, list[str]]:
         """Return its spring, and sentences on what an arm does not have."""
         return spring_of(self.model, self.number, self.name)
+
+    @property
+    def mimic(self) -> None:
+        """MJCF has no joints that follow others: see ``coupled``."""
+        return
+
+    @property
+    def holdable(self) -> bool:
+        """Whether it can be held at a position."""
+        return self.kind in _MOVING and not self.coupled
+
+    def held(self, position: float) -> MjcfJoint:
+        """Return it as one that is held at a position [rad] or [m]."""
+        return attrs.evolve(self, locked=position)
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -287,7 +302,7 @@ class _Builder:
         if name not in self._lock:
             return joint
         check_lock(name, joint.kind, self._lock[name], joint.limits()[0] if joint.kind in _MOVING else None)
-        return attrs.evolve(joint, locked=self._lock[name])
+        return joint.held(self._lock[name])
 
     def _add(self, joint: MjcfJoint, *, hangs: bool = True) -> None:
         self.parent_joints[joint.child] = joint

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import attrs
 import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
-from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, quoted
+from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, quoted, resting_position
 from armwright.arrays import Array
-from armwright.errors import one_of
+from armwright.errors import listed, one_of
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Solid
@@ -83,27 +83,27 @@ def chain_of(tree: Tree, base: str | None = None, tip: str | None = None) -> Cha
         raise tree.error(f"no joint moves between the links '{base}' and '{tip}'")
     if len(movable) > limit("joints"):
         raise tree.error(f"too many joints between '{base}' and '{tip}': {limit_message('joints', len(movable))}")
+    beside = _Beside(tree, frozenset(joint.name for joint in movable))
     X, moving = np.eye(4), []
-    branches: list[TreeJoint] = []
     # What moves beside the chain and hangs on the base is no load of the arm.
-    standing = list(_welded_links(tree, base, X, []))
+    standing = list(_welded_links(tree, base, X))
     links = [link for link, _ in standing]
     for joint in path:
         X = X @ joint.origin
         if not joint.fixed:
-            welded = list(_welded_links(tree, joint.child, X, branches))
+            welded = list(_welded_links(tree, joint.child, X, beside))
             links += [link for link, _ in welded]
             bodies = tuple(carry(tree.body(link), X_BL) for link, X_BL in welded)
             X_BJ = X @ homogeneous(np.eye(3), joint.anchor)
             moving.append(MovingJoint(joint=joint, X_BJ=X_BJ, axis=X[:3, :3] @ joint.axis, bodies=bodies))
-    _refuse_loads(tree, [joint for joint in branches if joint not in movable])
+    beside.refuse_loads()
     X_RB, root = np.eye(4), base
     while root in tree.parent_joints:
         root = tree.parent_joints[root].parent
     for joint in _joint_path(tree, root, base):
         X_RB = X_RB @ joint.origin
     solids = [solid.moved(X_BL) for link, X_BL in standing for solid in tree.solids(link)]
-    notes += tuple(tree.left_out(links))
+    notes += (*beside.notes(), *tree.left_out(links))
     return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, base_solids=tuple(solids), notes=notes)
 
 
@@ -153,33 +153,78 @@ def _joint_path(tree: Tree, base: str, tip: str) -> list[TreeJoint]:
     return path[::-1]
 
 
-def _welded_links(tree: Tree, link: str, X_BL: Array, branches: list[TreeJoint]) -> Iterator[tuple[str, Array]]:
+def _welded_links(tree: Tree, link: str, X_BL: Array, beside: _Beside | None = None) -> Iterator[tuple[str, Array]]:
     """Walk through the links that are fixed to a link and to one another, with their poses in the frame of the base.
 
-    Joints that move and hang on one of them are put into ``branches``, links with shapes that are not read into
-    ``unread``.
+    Joints beside the chain that move are held where ``beside`` has them; without it, what they carry is left out.
     """
     pending = [(link, X_BL)]
     while pending:
         name, X = pending.pop()
         yield name, X
         for joint in tree.child_joints[name]:
-            if joint.fixed:
-                pending.append((joint.child, X @ joint.origin))
-            else:
-                branches.append(joint)
+            held = joint if joint.fixed or beside is None else beside.held(joint)
+            if held.fixed:
+                pending.append((joint.child, X @ held.origin))
 
 
-def _refuse_loads(tree: Tree, branches: list[TreeJoint]) -> None:
-    """Refuse joints beside the chain that carry something: how that moves, a serial arm does not know."""
-    loaded = [joint for joint in branches if _carries_mass(tree, joint)]
-    if loaded:
-        single, names = len(loaded) == 1, [joint.name for joint in loaded]
-        does = "joint lies beside the chain, moves and has" if single else "joints lie beside the chain, move and have"
-        raise loaded[0].error(
-            f"{len(loaded)} {does} mass to carry: {quoted(names)}. An arm has no branches: choose another tip, or "
-            f"lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
-        )
+class _Beside:
+    """The joints that move, are not on the chain and hang on a link of it: an arm has them where they are held."""
+
+    def __init__(self, tree: Tree, chain: Collection[str]) -> None:
+        self._tree, self._chain = tree, chain
+        self._joints = {joint.name: joint for joint in tree.parent_joints.values()}
+        self._positions: dict[str, float] = {}
+        self._loose: list[TreeJoint] = []
+
+    def held(self, joint: TreeJoint) -> TreeJoint:
+        """Return a joint as one that is held; as it is if it is on the chain, or nothing holds it."""
+        if joint.name in self._chain:
+            return joint
+        position = self._position(joint)
+        if position is None:
+            self._loose.append(joint)
+            return joint
+        self._positions[joint.name] = position
+        return joint.held(position)
+
+    def _position(self, joint: TreeJoint) -> float | None:
+        """Return where a joint is held, a follower where it follows to; None where nothing holds it."""
+        if joint.name in self._chain or not joint.holdable:
+            return None
+        if joint.mimic is None:
+            return resting_position(joint.limits()[0])
+        position = self._position(self._joints[joint.mimic.joint])
+        return None if position is None else joint.mimic.multiplier * position + joint.mimic.offset
+
+    def refuse_loads(self) -> None:
+        """Refuse joints that nothing holds and that carry something: how that moves, a serial arm does not know.
+
+        Raises:
+            FileFormatError: there is one.
+        """
+        loaded = [joint for joint in self._loose if _carries_mass(self._tree, joint)]
+        if loaded:
+            single, names = len(loaded) == 1, [joint.name for joint in loaded]
+            does = "joint lies beside the chain, has" if single else "joints lie beside the chain, have"
+            moves = "moves with other joints or freely" if single else "move with other joints or freely"
+            raise loaded[0].error(
+                f"{len(loaded)} {does} mass to carry and {moves}: {quoted(names)}. An arm has no branches: choose "
+                f"another tip, or lock {'it' if single else 'them'}, at 0 or elsewhere: lock={names} "
+                f"(--lock {','.join(names)})",
+            )
+
+    def notes(self) -> list[str]:
+        """Return a sentence on the joints that are held and carry mass, and where."""
+        held = {
+            name: position
+            for name, position in self._positions.items()
+            if _carries_mass(self._tree, self._joints[name])
+        }
+        if not held:
+            return []
+        where = listed([f"'{name}' at {position:g}" for name, position in held.items()], len(held))
+        return [f"joints beside the chain are held, with the mass that they carry: {where} rad or m (--lock)"]
 
 
 def _carries_mass(tree: Tree, joint: TreeJoint) -> bool:

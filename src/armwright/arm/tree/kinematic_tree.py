@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import Link
 from armwright.arrays import Array, number
 from armwright.errors import FileFormatError, InvalidValueError, KindError, listed, shown
 from armwright.spatial.shapes import Solid
@@ -17,6 +18,20 @@ from armwright.spatial.shapes import Solid
 _MAX_LISTED = 50
 # Joints that are held: their names, or their positions by their names [rad] or [m].
 Lock: TypeAlias = Collection[str] | Mapping[str, float]
+
+
+class Mimic(NamedTuple):
+    """What a joint follows: its position is multiplier x + offset for the position x of another joint.
+
+    Attributes:
+        joint: the name of the other joint.
+        multiplier: by which its position is multiplied.
+        offset: what is added [rad] or [m].
+    """
+
+    joint: str
+    multiplier: float
+    offset: float
 
 
 class TreeJoint(Protocol):
@@ -62,6 +77,17 @@ class TreeJoint(Protocol):
 
     def spring(self) -> tuple[Spring, list[str]]:
         """Return its spring, and sentences on what was not taken as it stands."""
+
+    @property
+    def mimic(self) -> Mimic | None:
+        """The joint that it follows; None of one that is free."""
+
+    @property
+    def holdable(self) -> bool:
+        """Whether it can be held at a position: not where it has none, or where something else moves it."""
+
+    def held(self, position: float) -> TreeJoint:
+        """Return it as one that is held at a position [rad] or [m]."""
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -140,6 +166,15 @@ def locked_positions(lock: Lock) -> dict[str, float]:
         raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
     positions = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
     return {name: number(q, f"lock, '{name}'") for name, q in positions.items()}
+
+
+def resting_position(limits: Limits) -> float:
+    """Return where a joint is held that nobody says anything of: at 0, or in the middle if its limits exclude 0."""
+    if limits.lower <= 0 <= limits.upper:
+        return 0.0
+    if math.isfinite(limits.upper - limits.lower):
+        return limits.lower + (limits.upper - limits.lower) / 2
+    return limits.lower if limits.lower > 0 else limits.upper
 
 
 def check_lock(name: str, kind: str, position: float, limits: Limits | None) -> None:

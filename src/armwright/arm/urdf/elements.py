@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+import shlex
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,6 @@ from armwright.spatial.poses import homogeneous
 _MISSING: Any = object()
 # What is matched is not given back: a word of a million digits and a letter is passed once.
 _NUMBER = re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?", re.ASCII)
-_XACRO = "expand xacro files to URDF first: xacro FILE > robot.urdf"
 # What URDF has in a link, in a joint, and below those: elements, attributes.
 _KNOWN: dict[str, tuple[Collection[str], Collection[str]]] = {
     "robot": (("link", "joint", "material", "transmission", "gazebo", "sensor"), ("name", "version")),
@@ -53,6 +53,7 @@ _KNOWN: dict[str, tuple[Collection[str], Collection[str]]] = {
     "axis": ((), ("xyz",)),
     "limit": ((), ("lower", "upper", "effort", "velocity")),
     "dynamics": ((), ("damping", "friction")),
+    "mimic": ((), ("joint", "multiplier", "offset")),
 }
 
 
@@ -151,7 +152,7 @@ class Element:
 
     def _number(self, attribute: str, word: str) -> float:
         if not _NUMBER.fullmatch(word):
-            hint = f"; {_XACRO}" if "${" in word else ""
+            hint = f"; {_expand_first(self.path)}" if "${" in word else ""
             raise self.error(attribute, f"expected a number, got {shown(word)}{hint}")
         value = float(word)
         if abs(value) > LARGEST:
@@ -190,16 +191,22 @@ def read_elements(path: Path) -> Element:
         raw = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
         message = str(error.msg).partition(", line ")[0]
-        hint = f"; {_XACRO}" if "xacro" in message else ""
+        hint = f"; {_expand_first(path)}" if "xacro" in message else ""
         raise FileFormatError(path, error.lineno or None, "", f"not valid XML: {message}{hint}") from error
     space, tag = _split(raw)
     if tag != "robot":
         raise FileFormatError(path, raw.sourceline, "", f"expected <robot>, as URDF files have, got <{tag}>")
     foreign = next((each for each in raw.iter() if "xacro" in _split(each)[0]), None)
     if foreign is not None:
-        raise FileFormatError(path, foreign.sourceline, f"<{_split(foreign)[1]}>", _XACRO)
+        raise FileFormatError(path, foreign.sourceline, f"<{_split(foreign)[1]}>", _expand_first(path))
     _refuse_deep(path, raw)
     return _element(path, raw, space, "")
+
+
+def _expand_first(path: Path) -> str:
+    """Say what to do with a file of xacro."""
+    name = path.name.removesuffix(".xacro").removesuffix(".urdf")
+    return f"expand xacro files to URDF first: xacro {shlex.quote(path.name)} > {shlex.quote(name + '-expanded.urdf')}"
 
 
 def _refuse_deep(path: Path, raw: Any) -> None:

@@ -32,7 +32,8 @@ def load_urdf(
         tip: name of the link that is the tool; when left out the only one at the end of moving joints, or the link
             that carries all of them.
         lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
-            are held by their names [rad] or [m].
+            are held by their names [rad] or [m]. Others beside the chain are held at 0, or in the middle if their
+            limits exclude 0, or where they follow to.
         packages: folders of packages, by name, in which the meshes are that the file names as ``package://NAME/...``;
             others are looked for below the folder of the file.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -11,9 +11,10 @@ import attrs
 import numpy as np
 
 from armwright.arm.drive import Motor, Spring
-from armwright.arm.model import Limits, Link
+from armwright.arm.limits import Limits
+from armwright.arm.model import Link
 from armwright.arm.tensors import impossible_moments, moments_message
-from armwright.arm.tree.kinematic_tree import check_lock, quoted
+from armwright.arm.tree.kinematic_tree import Mimic, check_lock, quoted
 from armwright.arm.urdf.elements import Element, origin_of, read_elements
 from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.meshes import MeshFiles
@@ -41,6 +42,7 @@ class UrdfJoint:
         parent: link it hangs on.
         child: link it carries.
         element: where it stands in the file.
+        mimic: the joint that it follows; None of one that is free.
     """
 
     name: str
@@ -49,6 +51,7 @@ class UrdfJoint:
     child: str
     element: Element
     locked: float = 0.0
+    mimic: Mimic | None = None
 
     @property
     def fixed(self) -> bool:
@@ -93,6 +96,15 @@ class UrdfJoint:
         """Return that it has none: URDF has no springs."""
         return Spring(), []
 
+    @property
+    def holdable(self) -> bool:
+        """Whether it can be held at a position."""
+        return self.kind in _MOVING
+
+    def held(self, position: float) -> UrdfJoint:
+        """Return it as one that is held at a position [rad] or [m]."""
+        return attrs.evolve(self, kind="fixed", locked=position)
+
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the joint."""
         return self.element.error("", message)
@@ -107,10 +119,13 @@ class UrdfJoint:
             return
         if self.kind not in _MOVING:
             raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {', '.join(_MOVING)}")
-        follows = self.element.find("mimic")
-        if follows is not None:
-            master = follows.attributes.get("joint", "another joint")
-            raise follows.error("", f"the joint mimics '{master}'; an arm can only have independent joints")
+        if self.mimic is not None:
+            master = self.mimic.joint
+            raise self.element.require("mimic").error(
+                "",
+                f"the joint mimics '{master}'; an arm can only have independent joints: choose a tip before it, or "
+                f"lock '{master}', which holds this one where it follows to: lock=['{master}'] (--lock {master})",
+            )
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -205,6 +220,9 @@ def read_robot(
         child_joints[joint.parent].append(joint)
     for name in lock:
         one_of("joint", name, names)
+    for joint in _held_followers(names, lock):
+        parent_joints[joint.child] = joint
+        child_joints[joint.parent] = [joint if each.name == joint.name else each for each in child_joints[joint.parent]]
     if not links:
         raise root.error("", "expected at least one <link> in <robot>")
     name = root.attributes.get("name") or path.stem
@@ -231,14 +249,39 @@ def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float
             hint = f"; did you mean '{near}'?" if near else ""
             raise end.error("link", f"there is no link '{link}'{hint}")
         ends.append(link)
-    joint = UrdfJoint(name=element.name, kind=kind, parent=ends[0], child=ends[1], element=element)
-    return _locked(joint, lock[joint.name]) if joint.name in lock else joint
+    mimic = _mimic(element) if kind in _MOVING else None
+    joint = UrdfJoint(name=element.name, kind=kind, parent=ends[0], child=ends[1], element=element, mimic=mimic)
+    if joint.name not in lock:
+        return joint
+    position = lock[joint.name]
+    check_lock(joint.name, kind, position, limits_of(joint)[0] if position and joint.holdable else None)
+    return joint.held(position)
 
 
-def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
-    """Return a joint as one that is held at a position."""
-    check_lock(joint.name, joint.kind, position, limits_of(joint)[0] if position and joint.kind in _MOVING else None)
-    return attrs.evolve(joint, kind="fixed", locked=position)
+def _mimic(element: Element) -> Mimic | None:
+    """Return the joint that a joint follows; None of one that is free."""
+    mimic = element.find("mimic")
+    if mimic is None:
+        return None
+    return Mimic(mimic.text("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
+
+
+def _held_followers(joints: Mapping[str, UrdfJoint], lock: Mapping[str, float]) -> Iterator[UrdfJoint]:
+    """Give the joints that are held because what they follow is, each where it follows to; check whom all follow."""
+    for joint in joints.values():
+        position, chain = (0.0, 1.0), [joint]
+        while (mimic := chain[-1].mimic) is not None and chain[-1].name not in lock:
+            if mimic.joint not in joints:
+                near = closest(mimic.joint, joints)
+                hint = f"; did you mean '{near}'?" if near else ""
+                raise chain[-1].element.require("mimic").error("joint", f"there is no joint '{mimic.joint}'{hint}")
+            position = position[0] + position[1] * mimic.offset, position[1] * mimic.multiplier
+            chain.append(joints[mimic.joint])
+            if chain[-1] in chain[:-1]:
+                names = quoted(sorted({each.name for each in chain}))
+                raise joint.element.require("mimic").error("joint", f"joints follow one another in a cycle: {names}")
+        if len(chain) > 1 and chain[-1].name in lock:
+            yield joint.held(position[0] + position[1] * lock[chain[-1].name])
 
 
 def _refuse_cycles(robot: Robot) -> None:

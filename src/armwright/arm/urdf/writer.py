@@ -10,12 +10,15 @@ import math
 from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs
+from armwright.arm.coupling import Coupling
 from armwright.arm.drive import Motor
+from armwright.arm.limits import Limits
 from armwright.arm.losses import lost_beside_joints, lost_of_joint, mean_dry_friction
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Limits, Link
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Link
 from armwright.arm.names import distinct_names, refuse_names_beyond_xml
 from armwright.arm.positions import known_arm
 from armwright.arm.urdf.geometry import primitives
@@ -50,14 +53,17 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
     if len(tilts) != arm.n:
         raise ShapeError(f"tilts: expected {arm.n} of them, one for each joint, got {len(tilts)}")
     refuse_names_beyond_xml(arm)
-    root = _robot(arm, tilts)
+    root = _robot(_without_coupled_friction(arm), tilts)
     indent(root)
     return f"<?xml version='1.0' encoding='utf-8'?>\n{tostring(root, encoding='unicode')}\n"
 
 
 def lost_in_urdf(arm: Arm) -> list[str]:
     """Say what of an arm URDF cannot hold, in sentences; none where nothing is lost."""
-    lost = [sentence for i in range(arm.n) for sentence in _lost_of_joint(arm, i)]
+    own = _without_coupled_friction(arm)
+    lost = [sentence for i in range(arm.n) for sentence in _lost_of_joint(own, i)]
+    if arm.coupling is not None:
+        lost += _lost_of_coupling(arm.coupling)
     lost += _lost_solids("base", arm.base_solids)
     if arm.collisions != CollisionPairs():
         lost.append("the pairs of bodies that are checked for collisions, or not, are not in the file")
@@ -79,6 +85,28 @@ def _lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
     yield from _lost_solids(f"link {index + 1}", link.solids)
     if link.unknown:
         yield f"link {index + 1}: its mass and inertia are unknown and not in the file: {link.unknown}"
+
+
+def _without_coupled_friction(arm: Arm) -> Arm:
+    """Return an arm without the friction of drives that do not move one joint alone: it is no friction of a joint."""
+    if arm.coupling is None:
+        return arm
+    motors = list(arm.motors)
+    for i in arm.coupling.mixed:
+        motors[i] = Motor(inertia=motors[i].inertia, gear_ratio=motors[i].gear_ratio)
+    return attrs.evolve(arm, motors=motors)
+
+
+def _lost_of_coupling(coupling: Coupling) -> Iterator[str]:
+    """Say what of coupled drives is lost: URDF has a drive for each joint."""
+    if coupling.mixed:
+        numbers = ", ".join(str(i + 1) for i in coupling.mixed)
+        yield (
+            f"the coupling of the drives {numbers} and their friction are not in the file: the joints {numbers} have "
+            "no friction there"
+        )
+    if coupling.limits:
+        yield "the limits of the drives are not in the file, only those of the joints"
 
 
 def _lost_solids(body: str, solids: Sequence[Solid]) -> Iterator[str]:

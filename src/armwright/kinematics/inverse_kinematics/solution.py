@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import attrs
+import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, array_key, joint_array, read_only, reduce_by_fields
@@ -35,7 +36,7 @@ class Outcome(enum.StrEnum):
 
 @attrs.frozen(kw_only=True)
 class Violation:
-    """One joint outside its limits.
+    """One joint outside its limits, or the drive of one.
 
     Attributes:
         joint: number of the joint, from 1.
@@ -43,6 +44,7 @@ class Violation:
         limit: the limit it passes.
         revolute: whether ``value`` is an angle.
         name: of the joint; empty where it has none.
+        drive: whether it is the drive of the joint, one of coupled drives with limits of their own.
     """
 
     joint: int
@@ -50,6 +52,7 @@ class Violation:
     limit: float
     revolute: bool
     name: str = ""
+    drive: bool = False
 
     @property
     def excess(self) -> float:
@@ -60,8 +63,9 @@ class Violation:
         """Say it in degrees or millimetres."""
         unit, scale = ("deg", math.degrees(1.0)) if self.revolute else ("mm", 1e3)
         name = f" ('{self.name}')" if self.name else ""
+        of = "the drive of " if self.drive else ""
         return (
-            f"joint {self.joint}{name} would be at {self.value * scale:.1f} {unit}, "
+            f"{of}joint {self.joint}{name} would be at {self.value * scale:.1f} {unit}, "
             f"{self.excess * scale:.1f} {unit} beyond its limit {self.limit * scale:.1f} {unit}"
         )
 
@@ -174,9 +178,23 @@ def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
 
 def violations_of(arm: Arm, positions: Sequence[float]) -> tuple[Violation, ...]:
     """Return the same of n joint positions that have been checked."""
+    if arm.coupling is not None and arm.coupling.limits:
+        positions = [*positions, *arm.coupling.drives(np.array(positions)).tolist()]
+    return violations_of_all(arm, positions)
+
+
+def violations_of_all(arm: Arm, positions: Sequence[float]) -> tuple[Violation, ...]:
+    """Return the same of the positions of all that has limits: joints, and drives behind them where they have some."""
     violated = []
-    for i, (joint, value) in enumerate(zip(arm.joints, positions, strict=True), 1):
-        limit = min(max(value, joint.limits.lower), joint.limits.upper)
+    own = [joint.limits for joint in arm.joints]
+    limits = own if len(positions) == arm.n or arm.coupling is None else [*own, *arm.coupling.limits]
+    for k, (it, value) in enumerate(zip(limits, positions, strict=True)):
+        limit = min(max(value, it.lower), it.upper)
         if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
-            violated.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
+            joint, number = arm.joints[k % arm.n], k % arm.n + 1
+            violated.append(
+                Violation(
+                    joint=number, value=value, limit=limit, revolute=joint.revolute, name=joint.name, drive=k >= arm.n
+                )
+            )
     return tuple(violated)

@@ -9,7 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.hardware import PeakContact
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.controlled_stop import brake
+from armwright.motion.limited import braked
 from armwright.motion.plan import tool_path_length
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span
@@ -52,7 +52,7 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     """Stop an arm in the middle of its stage; return how many ticks it takes."""
     arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.segments[motion.arm], machine.cell.period
     last = runs[-1]
-    braking = brake(last.trajectory, local, arm.limits.acceleration, period=period)
+    braking = braked(arm, last.trajectory, local, period=period)
     tau = trajectory_efforts(arm, braking, period, _send_and_watch(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
@@ -180,7 +180,7 @@ def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     trajectory, local = motion.first_contact
     cell_arm, period = machine.cell.arms[motion.arm], machine.cell.period
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
-    braking = brake(trajectory, tick, cell_arm.arm.limits.acceleration, period=period)
+    braking = braked(cell_arm.arm, trajectory, tick, period=period)
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
     X_WT = machine.base_pose(motion.arm) @ forward(cell_arm.arm, q) @ motion.X_HM
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
