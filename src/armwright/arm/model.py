@@ -20,6 +20,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs, of_its_bodies
+from armwright.arm.documents import SourceDocument
 from armwright.arm.drive import Motor, Spring, check_numbers
 from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
 from armwright.arm.uncertainty import Uncertainty
@@ -286,6 +287,7 @@ class Arm:
         tool_link: what the tool is called.
         source: where the numbers come from.
         uncertainty: how well they are known, if they were measured.
+        documents: the documents that the numbers were read in, and which of them each gives.
     """
 
     name: str
@@ -313,6 +315,7 @@ class Arm:
     tool_link: str = ""
     source: str = ""
     uncertainty: Uncertainty | None = None
+    documents: tuple[SourceDocument, ...] = attrs.field(default=(), converter=tuple, eq=False)
 
     __reduce__ = reduce_by_fields
 

@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import body_names
+from armwright.arm.documents import SourceDocument
 from armwright.arm.drive import Motor
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.positions import known_arm
@@ -65,6 +66,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     if arm.gravity_from == "stated" or not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         yield from _table("gravity", {"m_per_s2": arm.gravity})
     yield from _collisions(arm)
+    yield from _documents(arm.documents)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
         yield f'kind = "{joint.kind}"'
@@ -81,6 +83,15 @@ def _lines(arm: Arm) -> Iterator[str]:
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
     if arm.uncertainty is not None:
         yield from _uncertainty(arm.uncertainty)
+
+
+def _documents(documents: Sequence[SourceDocument]) -> Iterator[str]:
+    for document in documents:
+        yield "[[document]]"
+        for key, value in attrs.asdict(document).items():
+            if value:
+                yield f"{key} = {_text(value) if isinstance(value, str) else json.dumps(value)}"
+        yield ""
 
 
 def _collisions(arm: Arm) -> Iterator[str]:
