@@ -15,6 +15,8 @@ _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "
 _MAX_NAME_LENGTH = 100
 # Known names that a message lists at most.
 _MAX_LISTED = 100
+# Of names that a command lists, a message has so many at most.
+_MAX_SIMILAR = 8
 # Characters of an invalid value that a message shows at most.
 _MAX_SHOWN_LENGTH = 60
 # Characters at the beginning and at the end of a message that is shortened.
@@ -86,21 +88,28 @@ class UnknownNameError(ArmwrightError, LookupError):
 
     exit_status = ExitStatus.USAGE
 
-    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
+    def __init__(
+        self, kind: str, name: object, known: Iterable[str], *, similar: Iterable[str] = (), all_by: str = ""
+    ) -> None:
         """Compose the message with the nearest and all known names.
 
         Args:
             kind: kind of the named object, for the message.
             name: the unknown name.
             known: the known names.
+            similar: those that may be meant where none is nearly the same.
+            all_by: the command that lists them, for those that are too many for a message.
         """
         name, choices = str(name), sorted(known)
         near = closest(name, choices)
         hint = f" Did you mean '{near}'?" if near else ""
+        if all_by and len(choices) > _MAX_SIMILAR:
+            listing = f" Similar: {listed(tuple(similar), _MAX_SIMILAR)}." if similar and not near else ""
+            super().__init__(f"no {kind} '{_cut(name)}'.{hint}{listing} All {len(choices)}: {all_by}.")
+            return
         more = f" and {len(choices) - _MAX_LISTED:,} more" if len(choices) > _MAX_LISTED else ""
         listing = f" Known: {', '.join(choices[:_MAX_LISTED])}{more}." if choices else " There is none."
-        name = name if len(name) <= _MAX_NAME_LENGTH else f"{name[:_MAX_NAME_LENGTH]}..."
-        super().__init__(f"no {kind} '{name}'.{hint}{listing}")
+        super().__init__(f"no {kind} '{_cut(name)}'.{hint}{listing}")
 
 
 class FileFormatError(ArmwrightError, ValueError):
@@ -246,6 +255,10 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
         if distance <= limit and 2 * distance < max(len(word), len(other)) and (best is None or distance < best[0]):
             best = (distance, choice)
     return best[1] if best else None
+
+
+def _cut(name: str) -> str:
+    return name if len(name) <= _MAX_NAME_LENGTH else f"{name[:_MAX_NAME_LENGTH]}..."
 
 
 @lru_cache(maxsize=4096)

@@ -67,7 +67,9 @@ def carry(link: Link, X_NM: Array) -> Link:
     """Describe a link of frame M in frame N instead, X_NM (4, 4) being the pose of M seen from N."""
     R, p = X_NM[:3, :3], X_NM[:3, 3]
     solids = [solid.moved(X_NM) for solid in link.solids]
-    return attrs.evolve(link, com=R @ link.com + p, inertia=R @ link.inertia @ R.T, solids=solids)
+    # What has no mass has no centre of mass to move.
+    com = R @ link.com + p if link.mass else link.com
+    return attrs.evolve(link, com=com, inertia=R @ link.inertia @ R.T, solids=solids)
 
 
 def about_com(inertia: Array, mass: float, com: Array) -> Array:

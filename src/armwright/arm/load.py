@@ -6,25 +6,47 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.coupling import Coupling
 from armwright.arm.dh import about_com, from_modified
+from armwright.arm.documents import SourceDocument, documents_in
 from armwright.arm.drive import Motor, Spring
 from armwright.arm.limits import Limits
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
-from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, unit_of, vector_in
+from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, typed_pose, unit_of, vector_in
 from armwright.arm.solid_entries import solids_in
 from armwright.arm.tensors import impossible_moments, moments_message
+from armwright.arm.tree.axes import dh_form
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
-from armwright.files.inputs import file_path
+from armwright.files.inputs import file_path, read_text
 from armwright.files.limits import limit, limit_message
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
+
+
+@attrs.frozen(kw_only=True)
+class ArmSummary:
+    """What the catalogue says of an arm before it is read.
+
+    Attributes:
+        name: in the catalogue.
+        joints: how many it has.
+        title: one line on what it is.
+        source: where the numbers come from.
+        documents: the documents that they were read in.
+    """
+
+    name: str
+    joints: int
+    title: str
+    source: str
+    documents: tuple[SourceDocument, ...]
 
 
 # Files of the robot description format; one of xacro is told apart there, with what to do.
@@ -35,6 +57,24 @@ _MJCF = ".xml"
 def arm_names() -> tuple[str, ...]:
     """Return the names of the catalogue, sorted."""
     return tuple(sorted(path.stem for path in _CATALOGUE.glob("*.toml")))
+
+
+def arm_summaries() -> tuple[ArmSummary, ...]:
+    """Return what the files of the catalogue say at their beginnings, in the order of the names."""
+    return tuple(_summary(_CATALOGUE / f"{name}.toml") for name in arm_names())
+
+
+def _summary(path: Path) -> ArmSummary:
+    """Read the keys at the top of a file of the catalogue, which is much quicker than the joints below them."""
+    text = read_text(path)
+    top = Document.parse(path, text.partition("\n[[joint]]")[0], is_json=False).root
+    return ArmSummary(
+        name=path.stem,
+        joints=sum(line.startswith("[[joint]]") for line in text.splitlines()),
+        title=top.text("title"),
+        source=top.text("source"),
+        documents=documents_in(top),
+    )
 
 
 def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = None) -> Arm:
@@ -64,8 +104,15 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
             return load_mjcf(name)
         return read_arm(name)
     if name not in arm_names():
-        raise UnknownNameError("arm", str(name), arm_names())
+        raise UnknownNameError("arm", name, arm_names(), similar=_similar(name), all_by="armwright arms")
     return read_arm(_CATALOGUE / f"{name}.toml")
+
+
+def _similar(name: str) -> list[str]:
+    """Return the arms that have a word in their names or titles, else those whose names begin as it does."""
+    word, all_of = name.lower(), arm_summaries()
+    found = [each.name for each in all_of if word and (word in each.name or word in each.title.lower())]
+    return found or [each.name for each in all_of if word and each.name[:3] == word[:3]]
 
 
 def is_path(name: str | Path) -> bool:
@@ -84,14 +131,17 @@ def read_arm(path: Path | str) -> Arm:
     """
     path = file_path(path)
     top = Document.read(path).root
-    convention = top.choice("convention", ("standard", "modified"), default="standard")
+    convention = top.choice("convention", ("standard", "modified", "urdf"), default="standard")
     tables = top.tables("joint", "joints")
     coupled, coupling = "coupling" in top, top.table("coupling")
     rows = coupling.vectors("matrix", len(tables)) if coupled else []
     coupling.refuse_unknown_keys()
-    joints, links, motors, drive_limits = [], [], [], []
+    joints, links, motors, drive_limits, origins, axes = [], [], [], [], [], []
     for table in tables:
-        joints.append(_joint(table))
+        if convention == "urdf":
+            origins.append(typed_pose(table).X)
+            axes.append(_axis(table))
+        joints.append(_joint(table, dh=convention != "urdf"))
         links.append(_link(table.table("link")))
         motor = table.table("motor")
         drive_limits.append(_drive_limits(motor, joints[-1].kind, coupled=coupled))
@@ -100,6 +150,9 @@ def read_arm(path: Path | str) -> Arm:
     base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
     if convention == "modified":
         before, joints, links = from_modified(joints, links)
+        base = base @ before
+    elif convention == "urdf":
+        before, joints, links, tool = dh_form(origins, axes, joints, links, tool)
         base = base @ before
     hand = top.table("hand")
     gravity = top.table("gravity")
@@ -123,6 +176,7 @@ def read_arm(path: Path | str) -> Arm:
         tool_link=top.text("tool_link", default=""),
         source=top.text("source", default=""),
         uncertainty=_uncertainty(top.table("uncertainty")),
+        documents=documents_in(top),
     )
     for table in (hand, gravity, top):
         table.refuse_unknown_keys()
@@ -156,21 +210,36 @@ def _uncertainty(table: Table) -> Uncertainty | None:
         raise table.error(None, str(error)) from error
 
 
-def _joint(table: Table) -> Joint:
+def _axis(table: Table) -> Array:
+    """Read the axis of a joint in its frame, as a unit vector."""
+    axis = table.vector("axis", 3)
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise table.error("axis", "expected a direction, got a vector of length 0")
+    return axis / length
+
+
+def _joint(table: Table, *, dh: bool) -> Joint:
+    """Read a joint; the four parameters of its row only where the convention has them."""
     kind = table.choice("kind", ("revolute", "prismatic"))
-    table.allow("fixed")
     units = ANGLE if kind == "revolute" else LENGTH
     spring = table.table("spring")
-    return Joint(
+    joint = Joint(
         kind="revolute" if kind == "revolute" else "prismatic",
+        limits=_limits(table.table("limits"), kind),
+        spring=_spring(spring, units),
+        name=table.text("name", default=""),
+    )
+    if not dh:
+        return joint
+    table.allow("fixed")
+    return attrs.evolve(
+        joint,
         theta=number_in(table, "theta", ANGLE, default=0.0),
         d=number_in(table, "d", LENGTH, default=0.0),
         a=number_in(table, "a", LENGTH, default=0.0),
         alpha=number_in(table, "alpha", ANGLE, default=0.0),
         fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
-        limits=_limits(table.table("limits"), kind),
-        spring=_spring(spring, units),
-        name=table.text("name", default=""),
     )
 
 

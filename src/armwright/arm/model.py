@@ -21,6 +21,7 @@ import numpy as np
 
 from armwright.arm.collision_pairs import CollisionPairs, of_its_bodies
 from armwright.arm.coupling import Coupling
+from armwright.arm.documents import SourceDocument
 from armwright.arm.drive import Motor, Spring, check_numbers
 from armwright.arm.limits import JointLimits, Limits
 from armwright.arm.tensors import ROUNDING, impossible_moments, moments_message
@@ -261,6 +262,7 @@ class Arm:
         tool_link: what the tool is called.
         source: where the numbers come from.
         uncertainty: how well they are known, if they were measured.
+        documents: the documents that the numbers were read in, and which of them each gives.
     """
 
     name: str
@@ -289,6 +291,7 @@ class Arm:
     tool_link: str = ""
     source: str = ""
     uncertainty: Uncertainty | None = None
+    documents: tuple[SourceDocument, ...] = attrs.field(default=(), converter=tuple, eq=False)
 
     __reduce__ = reduce_by_fields
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from armwright.arm.collision_pairs import body_names
 from armwright.arm.coupling import Coupling
+from armwright.arm.documents import SourceDocument
 from armwright.arm.drive import Motor
 from armwright.arm.limits import Limits
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
@@ -69,6 +70,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     yield from _collisions(arm)
     if arm.coupling is not None:
         yield from _coupling(arm.coupling)
+    yield from _documents(arm.documents)
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
         yield f'kind = "{joint.kind}"'
@@ -87,6 +89,15 @@ def _lines(arm: Arm) -> Iterator[str]:
             yield from _table("joint.motor.limits", _limits(joint, arm.coupling.limits[i - 1]))
     if arm.uncertainty is not None:
         yield from _uncertainty(arm.uncertainty)
+
+
+def _documents(documents: Sequence[SourceDocument]) -> Iterator[str]:
+    for document in documents:
+        yield "[[document]]"
+        for key, value in attrs.asdict(document).items():
+            if value:
+                yield f"{key} = {_text(value) if isinstance(value, str) else json.dumps(value)}"
+        yield ""
 
 
 def _collisions(arm: Arm) -> Iterator[str]:

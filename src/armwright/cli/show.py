@@ -32,6 +32,7 @@ def show(
     from rich.table import Table
 
     from armwright.arm.description import as_data, facts, tables
+    from armwright.arm.documents import document_lines
     from armwright.arm.load import load_arm
     from armwright.cli.terminal import console as clean_console
 
@@ -46,6 +47,8 @@ def show(
     console.print(f"{model.name}: {model.title}" if model.title else model.name, style="bold")
     if model.source:
         console.print(model.source, style="dim")
+    for line in document_lines(model.documents):
+        console.print(line, style="dim")
     for result in tables(model):
         console.print()
         console.print(result.title, style="bold")

@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate
 
 import attrs
 import numpy as np
 
-from armwright.arm.dh import twist
+from armwright.arm.dh import carry, twist
+from armwright.arm.model import Joint, Link
 from armwright.arrays import Array
 from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import elementary_rotation
@@ -86,6 +88,40 @@ def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Fr
         rows.append(row)
         poses.append(X)
     return Frames(first=first, rows=(*rows, Row()), poses=(*poses, X), leaning=tuple(leaning))
+
+
+def dh_form(
+    origins: Sequence[Array], axes: Sequence[Array], joints: Sequence[Joint], links: Sequence[Link], tool: Array
+) -> tuple[Array, list[Joint], list[Link], Array]:
+    """Turn joints that are given by their frames and axes, as in URDF, into the rows of a table.
+
+    Args:
+        origins: n poses (4, 4) of the frames of the joints, each in the frame before it, all joints at 0.
+        axes: n unit vectors (3,), each in the frame of its joint.
+        joints: n joints, without rows.
+        links: n links in the frames of their joints.
+        tool: (4, 4) pose of the tool in the last of these frames.
+
+    Returns:
+        The pose (4, 4) of frame 0, n joints, n links in the frames of the table, the tool (4, 4) in the last of them.
+    """
+    poses = list(accumulate(origins, np.matmul))
+    X_BT = poses[-1] @ tool
+    size = length_of(poses, X_BT)
+    frames = frames_of(poses, [X[:3, :3] @ axis for X, axis in zip(poses, axes, strict=True)], size)
+    rows = [attrs.evolve(joint, **attrs.asdict(row)) for joint, row in zip(joints, frames.rows, strict=True)]
+    steps = [cleared_pose(inverse(X) @ pose, size) for X, pose in zip(frames.poses, poses, strict=True)]
+    carried = [
+        carry(link, X) if link.mass else attrs.evolve(carry(link, X), com=np.zeros(3))
+        for link, X in zip(links, steps, strict=True)
+    ]
+    return cleared_pose(frames.first, size), rows, carried, cleared_pose(steps[-1] @ tool, size)
+
+
+def length_of(joints: Sequence[Array], X_BT: Array) -> float:
+    """Return the distance of the farthest of the joints and the tip from the base; 1 m where all are at one point."""
+    origins = np.array([*(X[:3, 3] for X in joints), X_BT[:3, 3]])
+    return float(np.linalg.norm(origins, axis=-1).max()) or 1.0
 
 
 def cleared(array: Array, size: float, rounding: float = ROUNDING) -> Array:

@@ -11,7 +11,7 @@ from armwright.arm.dh import carry
 from armwright.arm.gravity import felt_gravity, vector_text
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, GravityFrom, Joint, JointKind, Link
 from armwright.arm.tensors import impossible_moments
-from armwright.arm.tree.axes import Frames, cleared, cleared_pose, frames_of
+from armwright.arm.tree.axes import Frames, cleared, cleared_pose, frames_of, length_of
 from armwright.arm.tree.chain import Chain, chain_of
 from armwright.arm.tree.kinematic_tree import Tree
 from armwright.arrays import Array
@@ -52,10 +52,9 @@ def serial_arm(
         FileFormatError: there is no such arm.
     """
     chain = chain_of(tree, base, tip)
-    # The distance of the joints and the tip from the base, or 1 m where all are at one point.
-    origins = np.array([*(each.X_BJ[:3, 3] for each in chain.moving), chain.X_BT[:3, 3]])
-    size = float(np.linalg.norm(origins, axis=-1).max()) or 1.0
-    frames = frames_of([each.X_BJ for each in chain.moving], [each.axis for each in chain.moving], size)
+    poses = [each.X_BJ for each in chain.moving]
+    size = length_of(poses, chain.X_BT)
+    frames = frames_of(poses, [each.axis for each in chain.moving], size)
     joints, links, motors, notes = [], [], [], [*chain.notes, *_leaning(chain, frames)]
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
         limits, unknown = moving.joint.limits()

@@ -27,6 +27,10 @@ _ROUNDING = 1e-15
 _STILL = 1e-9
 # The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
+# An arm of fewer joints cannot turn its tool as it likes.
+_FULL = 6
+# What a rotation by one radian is worth beside the size of the arm where the position comes first.
+_LIGHT = 1e-4
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
 _SAME_CONFIGURATION = 1e-5
 # A joint motion is taken for free where the tool is not moved by it to first order (singular values below this part
@@ -53,7 +57,7 @@ class _Task:
     lower: Array
     upper: Array
     size: float = attrs.field(init=False)
-    length: float = attrs.field(init=False)
+    length: float = attrs.field()
 
     @size.default
     def _size(self) -> float:
@@ -76,7 +80,9 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
     limits hold during the search. When no start leads to the pose the search is made again without limits, to
     distinguish a pose that only the limits exclude from one that is out of reach; then the configuration with the least
-    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length.
+    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length. An arm of
+    fewer than six joints cannot turn its tool as it likes: where it reaches the position, the configuration is the one
+    that turns the tool nearest to the orientation there.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
@@ -99,7 +105,9 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         tried = np.concatenate([tried, more])
     if not len(reached):
         distances, angles = pose_errors(arm, tried, X)
-        best = nearest_equivalent(arm, tried[np.hypot(distances, limited.length * angles).argmin()], near)
+        order = np.hypot(distances, limited.length * angles).argsort()
+        turned = _turned_least(arm, X, tried[order[:_STARTS]]) if arm.n < _FULL else None
+        best = nearest_equivalent(arm, tried[order[0]] if turned is None else turned, near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
     return rank(arm, X, _named(limited, reached, near), near, apart=_SAME_CONFIGURATION)
 
@@ -115,6 +123,19 @@ def descend_from(arm: Arm, X: Array, near: Array) -> Array:
         near: (k, n) joint positions.
     """
     return _descend(_unlimited(arm, X), near)
+
+
+def _turned_least(arm: Arm, X: Array, near: Array) -> Array | None:
+    """Return the configuration that takes the tool to the position of a pose, and nearest to its orientation.
+
+    None where the position itself is out of reach. A rotation is worth so little that it moves the tool less than the
+    tolerance of a pose.
+    """
+    task = _unlimited(arm, X)
+    ends = _descend(attrs.evolve(task, length=_LIGHT * task.size), near)
+    distances, angles = pose_errors(arm, ends, X)
+    there = distances <= POSE_TOLERANCE
+    return ends[there][angles[there].argmin()] if there.any() else None
 
 
 def _unlimited(arm: Arm, X: Array) -> _Task:

@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, array_key, joint_array, read_only, reduce_by_fields
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, counted
 from armwright.notebook import html_table
 from armwright.spatial.poses import position_text
 
@@ -19,6 +19,8 @@ from armwright.spatial.poses import position_text
 _AT_LIMIT = 1e-9
 # A nearest pose turned by less than this has the orientation that was asked for [rad].
 _SHOWN_TURN = 1e-5
+# A nearest pose moved by less than this is at the position that was asked for [m].
+_AT_POSITION = 1e-5
 
 
 class Outcome(enum.StrEnum):
@@ -145,6 +147,11 @@ class InverseSolution:
 
     def explain(self) -> str:
         """Say in one sentence why no configuration can be taken."""
+        if self.outcome is Outcome.OUT_OF_REACH and self.rotation_error > _SHOWN_TURN and self.distance < _AT_POSITION:
+            return (
+                f"'{self.arm.name}', an arm of {counted(self.arm.n, 'joint')}, cannot turn its tool to the pose: at "
+                f"this position the nearest orientation is {math.degrees(self.rotation_error):.2f} deg away"
+            )
         if self.outcome is Outcome.OUT_OF_REACH:
             turned = f" and {math.degrees(self.rotation_error):.2f} deg" if self.rotation_error > _SHOWN_TURN else ""
             return (
