@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward, link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, pose_errors, rank
 from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, midpoints, nearest_equivalent
-from armwright.kinematics.inverse_kinematics.solution import InverseSolution
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
 from armwright.kinematics.jacobians import frame_columns
 from armwright.spatial.rotations import rotation_vector
 
@@ -101,7 +101,31 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         distances, angles = pose_errors(arm, tried, X)
         best = nearest_equivalent(arm, tried[np.hypot(distances, limited.length * angles).argmin()], near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
-    return rank(arm, X, _named(limited, reached, near), near, apart=_SAME_CONFIGURATION)
+    return ranked(arm, X, near, reached)
+
+
+def search_from(arm: Arm, X: Array, near: Array, starts: Array, *, more: bool) -> Array:
+    """Return the configurations (l, n) that meet one pose, sought from starts (k, n), whatever the limits.
+
+    Args:
+        arm: any arm.
+        X: (4, 4) tool pose in the base frame.
+        near: (n,) the present joint positions.
+        starts: (k, n) joint positions.
+        more: whether to search within the limits as well, as ``numeric_inverse`` does.
+    """
+    free = _unlimited(arm, X)
+    reached = _reaching(free, _descend(free, starts)) if len(starts) else np.empty((0, arm.n))
+    reached = np.array([nearest_equivalent(arm, q, near) for q in reached]).reshape(-1, arm.n)
+    if more:
+        limited = _Task(arm=arm, X=X, lower=arm.limits.lower, upper=arm.limits.upper)
+        reached = np.concatenate([reached, _search(limited, near)[1]])
+    return reached
+
+
+def ranked(arm: Arm, X: Array, near: Array, reached: Array) -> InverseSolution:
+    """Return the solution made of configurations (k, n) that meet a pose, numbered."""
+    return rank(arm, X, _named(_unlimited(arm, X), reached, near), near, apart=_SAME_CONFIGURATION)
 
 
 def descend_from(arm: Arm, X: Array, near: Array) -> Array:
@@ -115,6 +139,17 @@ def descend_from(arm: Arm, X: Array, near: Array) -> Array:
         near: (k, n) joint positions.
     """
     return _descend(_unlimited(arm, X), near)
+
+
+def free_joints(arm: Arm, X: Array, q: Array) -> tuple[int, ...]:
+    """Return the numbers of the joints that can move, together, without moving the tool; none of a redundant arm.
+
+    Args:
+        arm: any arm.
+        X: (4, 4) the pose of its tool.
+        q: (n,) a configuration there.
+    """
+    return _free_joints(_unlimited(arm, X), q)
 
 
 def _unlimited(arm: Arm, X: Array) -> _Task:
@@ -141,7 +176,7 @@ def _named(task: _Task, reached: Array, near: Array) -> list[Candidate]:
     """Number the configurations, nearest first, one of each free family."""
     solutions: list[Candidate] = []
     nearest = (nearest_equivalent(task.arm, q, near) for q in reached)
-    for q in sorted(nearest, key=lambda q: joint_distance(task.arm, near, q)):
+    for q in sorted(nearest, key=lambda q: (bool(violations(task.arm, q)), joint_distance(task.arm, near, q))):
         if any(_same(task.arm, q, other) for other in solutions):
             continue
         solutions.append(Candidate(q, f"numeric {len(solutions) + 1}", _free_joints(task, q)))
