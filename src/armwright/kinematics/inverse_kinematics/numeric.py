@@ -21,12 +21,17 @@ from armwright.spatial.rotations import rotation_vector
 _STARTS = 48
 _ROUNDS = 5
 _STEPS = 150
+# What a rotation by one radian is worth, in parts of the size of the arm; and where an arm of few joints cannot turn the
+# tool to a pose, so that it comes to its position at least.
+_WEIGHT, _POSITION_FIRST = 0.25, 1e-3
 # A residual this small, in parts of the size of the arm, is rounding.
 _ROUNDING = 1e-15
 # A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
 _STILL = 1e-9
 # The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
+# Joints that a pose takes.
+_POSE = 6
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
 _SAME_CONFIGURATION = 1e-5
 # A joint motion is taken for free where the tool is not moved by it to first order (singular values below this part
@@ -44,6 +49,7 @@ class _Task:
         X: (4, 4) the pose, or (k, 4, 4), one for each of k configurations.
         lower: (n,) lower bounds, may be infinite.
         upper: (n,) upper bounds.
+        weight: what a rotation by one radian is worth, in parts of the size of the arm.
         size: how long the arm is, for what is small [m].
         length: what a rotation by one radian is worth [m].
     """
@@ -52,6 +58,7 @@ class _Task:
     X: Array
     lower: Array
     upper: Array
+    weight: float = _WEIGHT
     size: float = attrs.field(init=False)
     length: float = attrs.field(init=False)
 
@@ -67,7 +74,7 @@ class _Task:
 
     @length.default
     def _length(self) -> float:
-        return max(self.size / 4, POSE_TOLERANCE)
+        return max(self.size * self.weight, POSE_TOLERANCE)
 
 
 def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
@@ -76,7 +83,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
     limits hold during the search. When no start leads to the pose the search is made again without limits, to
     distinguish a pose that only the limits exclude from one that is out of reach; then the configuration with the least
-    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length.
+    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length; with fewer than
+    six joints, which cannot turn the tool to every pose, as good as nothing, so that the tool comes to the position.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
@@ -98,8 +106,11 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         reached = np.array([nearest_equivalent(arm, q, near) for q in _reaching(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
     if not len(reached):
+        if arm.n < _POSE:
+            free = attrs.evolve(free, weight=_POSITION_FIRST)
+            tried = _descend(free, tried)
         distances, angles = pose_errors(arm, tried, X)
-        best = nearest_equivalent(arm, tried[np.hypot(distances, limited.length * angles).argmin()], near)
+        best = nearest_equivalent(arm, tried[np.hypot(distances, free.length * angles).argmin()], near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
     return ranked(arm, X, near, reached)
 

@@ -18,6 +18,8 @@ from armwright.spatial.poses import position_text
 _AT_LIMIT = 1e-9
 # A nearest pose turned by less than this has the orientation that was asked for [rad].
 _SHOWN_TURN = 1e-5
+# A nearest pose this near has the position that was asked for [m].
+_AT_POSITION = 1e-5
 
 
 class Outcome(enum.StrEnum):
@@ -143,6 +145,11 @@ class InverseSolution:
 
     def explain(self) -> str:
         """Say in one sentence why no configuration can be taken."""
+        if self.outcome is Outcome.OUT_OF_REACH and self.distance < _AT_POSITION:
+            return (
+                f"'{self.arm.name}' cannot turn its tool to the pose: the nearest orientation at its position is "
+                f"{math.degrees(self.rotation_error):.2f} deg off"
+            )
         if self.outcome is Outcome.OUT_OF_REACH:
             turned = f" and {math.degrees(self.rotation_error):.2f} deg" if self.rotation_error > _SHOWN_TURN else ""
             return (
