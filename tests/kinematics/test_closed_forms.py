@@ -125,7 +125,7 @@ def test_every_configuration_is_found_again(name: str, sample: Sample) -> None:
     sample.record(f"configurations found again, {name}", count, 0, median_residual=worst)
 
 
-@pytest.mark.parametrize("name", [*BUILDS, "xarm6", "jaco", "sixteen"])
+@pytest.mark.parametrize("name", [*(name for name in BUILDS if len(BUILDS[name][1]) < 7), "xarm6", "jaco", "sixteen"])
 @pytest.mark.drawn(0.15)
 def test_no_configuration_is_missed(name: str, sample: Sample) -> None:
     """What 400 descents from random starts find, whatever the limits, is among the branches, and no more than these."""
@@ -133,8 +133,6 @@ def test_no_configuration_is_missed(name: str, sample: Sample) -> None:
     found_here = found_there = 0
     for rng in sample.cases(10):
         arm = published[name]() if name in published else _build(name, rng)
-        if arm.n > 6:
-            pytest.skip("endless configurations")
         q = random_configurations(arm, rng, 1)[0]
         if not _regular(arm, q):
             continue

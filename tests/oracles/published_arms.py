@@ -63,7 +63,7 @@ def xarm6() -> Arm:
 
 
 def jaco() -> Arm:
-    """Kinova Jaco with its bent wrist: "DH Parameters of Jaco" 1.0.8, as in roboticstoolbox 1.5.0, models/DH/Jaco.py."""
+    """Kinova Jaco with its bent wrist: "DH Parameters of Jaco" 1.0.8, in roboticstoolbox 1.5.0, models/DH/Jaco.py."""
     bent = np.radians(30)
     share = np.sin(bent) / np.sin(2 * bent)
     return Arm(

@@ -21,8 +21,8 @@ from armwright.spatial.rotations import rotation_vector
 _STARTS = 48
 _ROUNDS = 5
 _STEPS = 150
-# What a rotation by one radian is worth, in parts of the size of the arm; and where an arm of few joints cannot turn the
-# tool to a pose, so that it comes to its position at least.
+# What a rotation by one radian is worth, in parts of the size of the arm; and where an arm of few joints cannot turn
+# the tool to a pose, so that it comes to its position at least.
 _WEIGHT, _POSITION_FIRST = 0.25, 1e-3
 # A residual this small, in parts of the size of the arm, is rounding.
 _ROUNDING = 1e-15
@@ -83,8 +83,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
     limits hold during the search. When no start leads to the pose the search is made again without limits, to
     distinguish a pose that only the limits exclude from one that is out of reach; then the configuration with the least
-    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length; with fewer than
-    six joints, which cannot turn the tool to every pose, as good as nothing, so that the tool comes to the position.
+    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length; with fewer
+    than six joints, which cannot turn the tool to every pose, as good as nothing: the tool comes to the position.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
