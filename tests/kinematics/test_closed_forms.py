@@ -15,7 +15,7 @@ from armwright.compiled.arm import compile_arm
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.axes import joint_axes
-from armwright.kinematics.inverse_kinematics.closed_forms import find_closed_form
+from armwright.kinematics.inverse_kinematics.closed_forms import _wristed, find_closed_form
 from armwright.kinematics.inverse_kinematics.numeric import descend_from
 from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
@@ -222,6 +222,25 @@ def test_scara_names_its_elbow() -> None:
     assert set(labels) == {"elbow left", "elbow right"}
     assert labels["elbow right"] == pytest.approx(0.8)
     assert labels["elbow left"] == pytest.approx(-0.8)
+
+
+@pytest.mark.parametrize("name", ["last parallel, 2 more", "last parallel, 3 more", "three parallel, 2 more"])
+def test_names_say_how_the_arm_stands(name: str, rng: np.random.Generator) -> None:
+    """Every branch has a name of its own, and the elbow called up is above the line from joint 2 to the forearm's end.
+
+    Left and right are those of the PUMA: with its axes at right angles an arm has the same names by either closed form.
+    """
+    arm = _build(name, rng)
+    for q in random_configurations(arm, rng, 10):
+        labels = [branch.label for branch in inverse(arm, forward(arm, q))]
+        assert len(set(labels)) == len(labels)
+    puma = load_arm("puma560")
+    axes = joint_axes(puma)
+    form = next(_wristed(axes))
+    for q in random_configurations(puma, rng, 10):
+        for branch in inverse(puma, forward(puma, q)):
+            arm_side, elbow, _ = branch.label.split(", ")
+            assert form.label(0, branch.q).startswith(f"shoulder {arm_side}, elbow {elbow}, wrist ")
 
 
 def test_a_pose_that_a_scara_cannot_turn_to() -> None:

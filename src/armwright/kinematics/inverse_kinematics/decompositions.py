@@ -21,7 +21,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.inverse_kinematics.axes import Axes
+from armwright.kinematics.inverse_kinematics.axes import SAME, Axes, are_perpendicular
 from armwright.kinematics.inverse_kinematics.branches import ClosedForm, Solved
 from armwright.kinematics.inverse_kinematics.geometry import ON_AXIS, Sign
 from armwright.kinematics.inverse_kinematics.subproblems import Turn, rotated, turn_onto, turn_to_height
@@ -67,9 +67,40 @@ class OfAxes(ClosedForm):
         R = product(R_BT, transpose(self.axes.X_BT[:3, :3].tolist()))
         return R, subtract(p_BT, apply(R, self.axes.X_BT[:3, 3].tolist()))
 
-    def label(self, branch: int, q: Array) -> str:  # noqa: ARG002 - others look at how the arm stands
-        """Name a branch by the joints whose choice tells it from the others."""
-        return label_of(self.deciding, self.signs[branch])
+    def label(self, branch: int, q: Array) -> str:
+        """Name a branch by the joints whose choice tells it from the others.
+
+        Where axes 2 and 3 are parallel and at a right angle to axis 1, shoulder and elbow are named by how the arm
+        stands, as those of a PUMA are.
+        """
+        signs = list(self.signs[branch])
+        if self.arm_end is not None:
+            signs[:2] = self._stance(q, self.arm_end)
+        return label_of(self.deciding, signs)
+
+    @property
+    def arm_end(self) -> Array | None:
+        """The point (3,) at the end of the forearm, if axes 2 and 3 are parallel and at a right angle to axis 1."""
+        return None
+
+    def _stance(self, q: Array, end: Array) -> tuple[Sign, Sign]:
+        """Return whether an arm stands to the left, and whether its elbow is up, each 1 or -1.
+
+        It stands to the left where it reaches out on the side that joint 1 faces, with the plane of the arm on the left
+        of that; its elbow is up where it is above the line from joint 2 to the end of the forearm.
+        """
+        o, h = self.axes.points, self.h
+        places = [o[1], o[2], end]
+        for i in (2, 1, 0):
+            moved = [add(rotated(h[i], q[i], (p - o[i]).tolist()), o[i].tolist()) for p in places[i:]]
+            places[i:] = [np.array(p) for p in moved]
+        shoulder, at_elbow, at_end = places
+        y = np.array(rotated(h[0], q[0], h[1]))
+        y = -y if (at_end - o[0]) @ y < -SAME else y
+        left = (at_end - o[0]) @ np.cross(y, h[0]) > 0
+        span, upper = (v - y * (v @ y) for v in (at_end - shoulder, at_elbow - shoulder))
+        lift = upper - span * (upper @ span) / max(span @ span, SAME**2)
+        return 1 if left else -1, 1 if lift @ np.array(h[0]) > 0 else -1
 
     @property
     @abstractmethod
@@ -124,9 +155,15 @@ class Wristed(Decomposed):
 
     @property
     def deciding(self) -> tuple[int, ...]:
-        """The two joints that bring the point to its place, and the first of a wrist of three."""
+        """The two joints that bring the point to its place, and the middle one of a wrist of three."""
         first = {"last parallel": (1, 3), "first parallel": (3, 2), "last meet": (1, 2), "first meet": (3, 1)}
-        return (*first[self.pair], *((4,) if len(self.h) == 6 else ()))
+        return (*first[self.pair], *((5,) if len(self.h) == 6 else ()))
+
+    @property
+    def arm_end(self) -> Array | None:
+        """The centre of the wrist."""
+        upright = self.pair == "last parallel" and are_perpendicular(*self.axes.directions[:2])
+        return self.centre if upright else None
 
     def displaced(self, R: Matrix, p: Vector, near: Vector, signs: Sequence[Sign]) -> Solved:
         """Return one branch: the first three joints by the position of the centre, the others by the rotation."""
@@ -249,6 +286,11 @@ class ThreeParallel(Decomposed):
     def deciding(self) -> tuple[int, ...]:
         """The first joint, the elbow, and the wrist where there are two joints in it."""
         return (1, 3, 5) if len(self.h) == 6 else (1, 3)
+
+    @property
+    def arm_end(self) -> Array | None:
+        """Where joint 4 is."""
+        return np.asarray(self.axes.points[3]) if are_perpendicular(*self.axes.directions[:2]) else None
 
     def displaced(self, R: Matrix, p: Vector, near: Vector, signs: Sequence[Sign]) -> Solved:
         """Return one branch: joint 1 by the position, the sum of joints 2 to 4 by the rotation, then the elbow."""

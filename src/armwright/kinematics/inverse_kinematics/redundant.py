@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 
@@ -48,8 +49,8 @@ class Swivelling(Redundant, OfAxes):
     """A spherical shoulder, an elbow and a spherical wrist: the elbow swivels about the line from shoulder to wrist.
 
     The swivel is 0 where the elbow is in the plane of that line and the axis of joint 1, on the side to which the axis
-    points; it counts about the line towards the wrist. With the wrist on the axis of joint 1 a fixed direction takes
-    the place of the axis.
+    points; it counts about the line towards the wrist. With the wrist on the axis of joint 1 the direction in which the
+    elbow bends with joints 1 to 3 at 0 takes the place of the axis.
 
     Attributes:
         shoulder: (3,) the point where axes 1 to 3 meet, at joint positions 0 [m].
@@ -126,7 +127,10 @@ class Swivelling(Redundant, OfAxes):
     def reference(self, to_wrist: Vector) -> tuple[Vector, Vector, Vector]:
         """Return unit vectors along the line to the wrist, to where the swivel is 0, and where it is 90 deg."""
         line = _unit(to_wrist)
-        axis, instead = self.h[0], across(self.h[0])
+        axis = self.h[0]
+        # Where the elbow bends to when the arm stands up, so that the swivel of an upright arm is 0.
+        bending = cross(self.h[3], axis)
+        instead = _unit(bending) if math.hypot(*bending) > SINGULAR_SINE else across(axis)
         upwards = subtract(axis, scale(dot(axis, line), line))
         sideways = subtract(instead, scale(dot(instead, line), line))
         on_axis = dot(upwards, upwards) < SINGULAR_SINE**2
@@ -201,7 +205,7 @@ class Locked(Redundant):
 
     def label(self, branch: int, q: Array) -> str:
         """Name a branch as the arm without that joint does."""
-        if isinstance(self.rest, OfAxes):
+        if isinstance(self.rest, OfAxes) and self.rest.arm_end is None:
             return label_of([self._here(joint) for joint in self.rest.deciding], self.signs[branch])
         return self.rest.label(branch, np.delete(q, self.joint - 1))
 

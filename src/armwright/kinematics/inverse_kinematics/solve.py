@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions, single_configuration
 from armwright.arrays import Array, ArrayLike, Flags, leading_axes
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward_kinematics import per_joint, stack
+from armwright.kinematics.forward_kinematics import forward, per_joint, stack
 from armwright.kinematics.inverse_kinematics.branches import Branches, ClosedForm, merged
 from armwright.kinematics.inverse_kinematics.builds import OfBuild, wrist_pose
 from armwright.kinematics.inverse_kinematics.candidates import (
@@ -108,11 +108,11 @@ def inverse(
     form = find_closed_form(arm)
     if isinstance(form, Redundant):
         candidates = redundant_candidates(arm, form, X, reference, swivel)
-        return (
-            rank(arm, X, candidates, reference, apart=_SAME_POLISHED)
-            if candidates
-            else numeric_inverse(arm, X, reference)
-        )
+        if not candidates:
+            return numeric_inverse(arm, X, reference)
+        X_near = forward(arm, candidates[0].q)
+        met = len(candidates) > 1 or max(pose_errors(arm, candidates[0].q, X)) <= POSE_TOLERANCE
+        return rank(arm, X, candidates, reference, apart=_SAME_POLISHED, X_near=None if met else X_near)
     if swivel != "nearest":
         raise UnsupportedArmError(
             f"arm '{arm.name}' has no swivel; expected an arm of 7 joints with a closed-form inverse"
