@@ -15,7 +15,7 @@ from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Ou
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
-from oracles.arms import random_configurations
+from oracles.arms import random_arm, random_configurations
 
 ARMS = ("puma560-seed", "stanford", "stanford-jpl")
 SAME_CONFIGURATION = 1e-9  # a configuration found again
@@ -223,8 +223,8 @@ def test_base_and_tool_count(rng: np.random.Generator) -> None:
 
 def test_other_arms_are_refused() -> None:
     """An arm of another build has no branches in closed form and is told so."""
-    with pytest.raises(UnsupportedArmError, match=r"'ntu-3r': no closed-form inverse kinematics"):
-        inverse_branches(load_arm("ntu-3r"), np.eye(4))
+    with pytest.raises(UnsupportedArmError, match=r"'random': no closed-form inverse kinematics"):
+        inverse_branches(random_arm(np.random.default_rng(0), 6), np.eye(4))
 
 
 def test_shapes_that_do_not_fit() -> None:

@@ -114,12 +114,12 @@ def test_seven_joints(rng: np.random.Generator, sample: Sample) -> None:
         solution = inverse(SEVEN, forward(SEVEN, q), near)
 
         assert solution.outcome is Outcome.SOLVED
-        assert len(solution.branches) > 1
-        assert all(max(b.position_error, b.rotation_error) < RESIDUAL and b.allowed for b in solution)
-        ways = [np.linalg.norm(branch.q - near) for branch in solution]
+        assert len(solution.allowed) > 1
+        assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
+        ways = [np.linalg.norm(branch.q - near) for branch in solution.allowed]
         assert ways[0] == min(ways)
         assert ways[0] < 3 * np.linalg.norm(q - near)
-        assert solution.best.label == "numeric 1"
+        assert solution.best.label.startswith("shoulder ")
 
 
 def test_the_same_question_has_the_same_answer() -> None:

@@ -13,9 +13,9 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
+from armwright.kinematics.inverse_kinematics.builds import BRANCHES
 from armwright.kinematics.inverse_kinematics.geometry import solve_elbow, solve_joint_1
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
-from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.door import ROWS_BETWEEN_SIGNALS
 from armwright.tracing.emit import emit
 from armwright.tracing.kernel import LANES, CalledOff, Kernel, _addresses, on_cores_for_long

@@ -230,18 +230,18 @@ class CompiledArm:
     def inverse_branches(
         self, pose: ArrayLike, near: ArrayLike, *, threads: int | None = None, out: tuple[Array, Flags] | None = None
     ) -> tuple[Array, Flags]:
-        """Return all eight IK branches of poses, unjudged, as ``kinematics.inverse`` does for a closed form.
+        """Return all k IK branches of poses, unjudged, as ``kinematics.inverse_branches`` does: eight of six joints.
 
         Args:
             pose: (..., 4, 4) tool poses in the base frame.
-            near: (..., 6) joint positions [rad] or [m]; angles come back within pi of it, and a free joint
+            near: (..., n) joint positions [rad] or [m]; angles come back within pi of it, and a free joint
                 takes its value from it.
             threads: how many cores to use; all when None.
-            out: (..., 8, 6) and (..., 8) to fill.
+            out: (..., k, n) and (..., k) to fill.
 
         Returns:
-            q: (..., 8, 6) joint positions [rad] or [m].
-            singular: (..., 8) whether a joint is free there.
+            q: (..., k, n) joint positions [rad] or [m].
+            singular: (..., k) whether a joint is free there.
 
         Raises:
             UnsupportedArmError: the arm has no closed form.

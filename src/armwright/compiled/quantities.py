@@ -23,8 +23,8 @@ from armwright.dynamics.shares import gravity_shares, speed_shares
 from armwright.dynamics.springs import less_springs, spring_energy, with_springs
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
-from armwright.kinematics.inverse_kinematics.branches import branches, merged
-from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
+from armwright.kinematics.inverse_kinematics.branches import merged
+from armwright.kinematics.inverse_kinematics.closed_forms import closed_form_of
 from armwright.kinematics.jacobians import frame_columns, tool_columns
 from armwright.tracing.emit import Emitted, Equation, Guarded, emit
 from armwright.tracing.evaluation import evaluate
@@ -57,7 +57,7 @@ def emit_quantity(arm: Arm, name: str, *, loops: bool | None = None, origin: str
     if name not in _GEOMETRY:
         weighed(arm)
     if name == "inverse_branches":
-        closed_form_geometry(arm)
+        closed_form_of(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
     max_straight = quantity.max_straight
@@ -150,7 +150,7 @@ def _tool_jacobian(arm: Arm, q: Numbers) -> Rows:
 
 def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
     R = [list(X_BT[4 * i : 4 * i + 3]) for i in range(3)]
-    q, singular = merged(branches(arm, closed_form_geometry(arm), R, [X_BT[4 * i + 3] for i in range(3)], near))
+    q, singular = merged(closed_form_of(arm).branches(arm, R, [X_BT[4 * i + 3] for i in range(3)], near))
     return [[x for row in q for x in row], singular]
 
 
@@ -226,7 +226,8 @@ def _pose(frame: tuple[Matrix, Vector]) -> Vector:
 class _Quantity(NamedTuple):
     """A quantity of the table below.
 
-    In shapes, n is the number of joints, f that of the frames, p that of the parameters, b that of the base parameters.
+    In shapes, n is the number of joints, f that of the frames, p that of the parameters, b that of the base parameters,
+    k that of the branches of the inverse kinematics.
 
     Attributes:
         equation: over abstract scalars.
@@ -250,6 +251,8 @@ class _Quantity(NamedTuple):
 def _size(arm: Arm, letter: str | int) -> int:
     if isinstance(letter, int):
         return letter
+    if letter == "k":
+        return len(closed_form_of(arm).signs)
     if letter == "b":
         return len(base_parameters(arm).columns)
     return parameter_count(arm) if letter == "p" else {"n": arm.n, "f": arm.n + 2}[letter]
@@ -270,7 +273,9 @@ _QUANTITIES = {
     "jacobian": _Quantity(_jacobian, _Q, ((6, "n"),)),
     "tool_jacobian": _Quantity(_tool_jacobian, _Q, ((6, "n"),)),
     "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
-    "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
+    "inverse_branches": _Quantity(
+        _inverse_branches, {"pose": (4, 4), "near": ("n",)}, (("k", "n"), ("k",)), flags=(1,)
+    ),
     "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),), max_straight=2300),
     "inverse_dynamics_with_wrench": _Quantity(
         _inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),), max_straight=2300

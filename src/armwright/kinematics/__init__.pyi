@@ -5,6 +5,11 @@ from .differential import (
     differential_inverse as differential_inverse,
 )
 from .forward_kinematics import forward as forward, link_poses as link_poses
+from .inverse_kinematics.redundancy import (
+    SwivelInterval as SwivelInterval,
+    swivel_intervals as swivel_intervals,
+    swivel_of as swivel_of,
+)
 from .inverse_kinematics.revolutions import (
     equivalent_configurations as equivalent_configurations,
     nearest_equivalent as nearest_equivalent,

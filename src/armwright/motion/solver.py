@@ -14,7 +14,8 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
-from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.closed_forms import find_closed_form
+from armwright.kinematics.inverse_kinematics.redundant import Locked
 from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 from armwright.motion.rows import Evaluator, by_kernels, on_arrays
 from armwright.tracing.loops import Runner, compiled, compiled_quickly, with_numpy
@@ -27,7 +28,8 @@ class Solver(NamedTuple):
         arm: the arm.
         forward: tool poses (..., 4, 4) of q (..., n).
         inverse_dynamics: efforts (..., n) of q, qd, qdd (..., n).
-        inverse_branches: the eight configurations of poses, see ``kinematics.inverse``; None without a closed form.
+        inverse_branches: the branches of poses, see ``kinematics.inverse_branches``; None without a closed form for
+            all poses.
         rows: evaluates other equations of many rows.
         run: runs routines.
     """
@@ -51,11 +53,16 @@ def solver_of(arm: AnyArm) -> Solver:
     if isinstance(arm, CompiledArm):
         forward_, dynamics = partial(_by_kernel, arm, "forward", 1), partial(_by_kernel, arm, "inverse_dynamics", 1)
         branches_ = partial(_by_kernel, arm, "inverse_branches", 2)
-        closed = find_geometry(arm.arm) is not None
         run = compiled_quickly if arm.quickly else compiled
-        return Solver(arm.arm, forward_, dynamics, branches_ if closed else None, by_kernels, run)
-    branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
+        return Solver(arm.arm, forward_, dynamics, branches_ if _has_branches(arm.arm) else None, by_kernels, run)
+    branches = partial(inverse_branches, arm) if _has_branches(known_arm(arm)) else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches, on_arrays, with_numpy)
+
+
+def _has_branches(arm: Arm) -> bool:
+    """Whether a closed form leads along any path: not one that holds a joint where others can go on."""
+    form = find_closed_form(arm)
+    return form is not None and not isinstance(form, Locked)
 
 
 def _by_kernel(arm: CompiledArm, name: str, axes: int, *inputs: Array) -> Any:

@@ -8,16 +8,17 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.cell.model import CellArm
 from armwright.compiled.arm import CompiledArm, planning_arm
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
-from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.branches import ClosedForm
+from armwright.kinematics.inverse_kinematics.builds import BRANCHES, OfBuild
+from armwright.kinematics.inverse_kinematics.closed_forms import find_closed_form
 from armwright.kinematics.inverse_kinematics.revolutions import joint_distances
 from armwright.kinematics.inverse_kinematics.solution import violations_of
-from armwright.kinematics.inverse_kinematics.solve import label
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.kinematics.singularity_analysis import determinant_factors, singularities
@@ -106,7 +107,7 @@ class LiveArm:
         revolute = placed.arm.revolute
         self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
         self._near = np.where(revolute, _NEAR_ANGLE, _NEAR_LENGTH)
-        self._geometry = find_geometry(placed.arm)
+        self._form = find_closed_form(placed.arm)
         # A pose, and the configurations that bring the tool there.
         self._latest: tuple[Array, Array] = np.empty((0, 0)), np.empty((0, 0))
 
@@ -118,8 +119,8 @@ class LiveArm:
 
     @property
     def closed(self) -> bool:
-        """Whether its inverse kinematics is known in closed form."""
-        return self._geometry is not None
+        """Whether a closed form finds all configurations of a pose: of six joints, neither more nor fewer."""
+        return self._form is not None and self.placed.arm.n == _POSE
 
     @cached_property
     def reach(self) -> float:
@@ -138,7 +139,7 @@ class LiveArm:
         """Compile what moving the arm needs."""
         self.tool_at(self.q)
         self.jacobian_at(self.q)
-        if self._geometry is not None:
+        if self._form is not None:
             self.solutions()
 
     # ---- where it is ---------------------------------------------------------------------------------------------
@@ -155,11 +156,11 @@ class LiveArm:
 
     def solutions(self) -> list[Solution]:
         """Return all configurations that bring the tool to where it is; of an arm without a closed form the present."""
-        if self._geometry is None or self.equations is None:
+        if self._form is None or self.equations is None:
             return [Solution(self.q, "numeric", "", here=True)]
         rows = self._branches(self.tool)
         here = int(joint_distances(self.placed.arm, self.q, rows).argmin()) if len(rows) else -1
-        labels = _labels(self._geometry, rows)
+        labels = _labels(self.placed.arm, self._form, rows)
         return [
             Solution(q, labels[i], "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))), here=i == here)
             for i, q in enumerate(rows)
@@ -261,12 +262,15 @@ class LiveArm:
         Raises:
             UnreachableError: none within the limits does.
         """
-        if self._geometry is None or self.equations is None:
+        if self._form is None or self.equations is None:
             return self.stepped_to(X_WT, self.q)
         rows = self._branches(X_WT)
+        allowed = self.is_allowed(rows)
+        # Fewer joints are led by the position alone, and of more the one that the closed form leaves moves too.
+        if not self.closed and not allowed.any():
+            return self.stepped_to(X_WT, self.q)
         if not len(rows):
             raise UnreachableError(f"out of reach of {self.name}")
-        allowed = self.is_allowed(rows)
         distances = joint_distances(self.placed.arm, self.q, rows)
         if not allowed.any():
             nearest = rows[distances.argmin()]
@@ -336,17 +340,20 @@ class LiveArm:
         return Remark("singular", "error" if near == "at" else "warning", text, joints)
 
 
-def _labels(geometry: ClosedFormGeometry, q: Array) -> list[str]:
+def _labels(arm: Arm, form: ClosedForm, q: Array) -> list[str]:
     """Return the names of the branches that configurations (k, n) are in.
 
-    Branches meet where a factor of the determinant of the Jacobian vanishes: they differ in its signs.
+    Branches of a build meet where a factor of the determinant of the Jacobian vanishes: they differ in its signs.
     """
+    if not isinstance(form, OfBuild):
+        return form.labels(arm, q)
+    geometry = form.geometry
     angles = geometry.angles(list(q.T))
     side, second, flip = (np.where(factor >= 0, 1, -1).tolist() for factor in determinant_factors(geometry, angles))
     # The factor of an elbow falls where its angle grows.
     sign = 1 if geometry.family == "stanford" else -1
-    rows = np.array(angles).T.tolist()
-    return [label(geometry, (side[i], sign * second[i], flip[i]), row) for i, row in enumerate(rows)]
+    numbers = [BRANCHES.index((side[i], sign * second[i], flip[i])) for i in range(len(q))]
+    return [form.label(number, row) for number, row in zip(numbers, q, strict=True)]
 
 
 def _direction_text(twist: Array) -> str:

@@ -80,7 +80,7 @@ def _parallel(geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: Signs, 
         Hawkins (2013), "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", in other frames.
     """
     arm, elbow, flip = signs
-    other: Sign = -1 if flip > 0 else 1
+    other = -flip
     theta_1, X = solve_joint_1(geometry, p, arm, near[0])
     R_SW = product(rotation_about_z_then_y(theta_1, 0.0), geometry.R_3W.tolist())
     # Read backwards, so that it is joint 6 that is free with joint 5 straight, and not the sum.

@@ -28,11 +28,12 @@ POSE_TOLERANCE = 2e-6
 
 
 class Candidate(NamedTuple):
-    """A configuration (n,) with its name and the joints that are free there."""
+    """A configuration (n,) with its name, the joints that are free there, and of seven joints the swivel."""
 
     q: Array
     label: str
     free: tuple[int, ...] = ()
+    swivel: float | None = None
 
 
 def exact_pose(X_BT: ArrayLike) -> Array:
@@ -127,8 +128,9 @@ def rank(
             free=free,
             position_error=float(distance),
             rotation_error=float(angle),
+            swivel=swivel,
         )
-        for (q, label, free), distance, angle in zip(distinct, distances, angles, strict=True)
+        for (q, label, free, swivel), distance, angle in zip(distinct, distances, angles, strict=True)
     ]
     branches.sort(key=lambda branch: (not branch.allowed, joint_distance(arm, near, branch.q)))
     allowed = [branch for branch in branches if branch.allowed]

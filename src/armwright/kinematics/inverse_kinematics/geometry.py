@@ -115,7 +115,7 @@ def solve_joint_1(geometry: ClosedFormGeometry, p: Vector, arm: Sign, free: Scal
     """
     x, y, _ = p
     square = x * x + y * y
-    across = _root(square - geometry.plane_offset**2, square)
+    across = root(square - geometry.plane_offset**2, square)
     theta = atan2(y, x) - atan2(geometry.plane_offset, arm * across)
     return select(square < ON_AXIS**2, free, theta), arm * across - geometry.shoulder_offset
 
@@ -125,7 +125,7 @@ def solve_elbow(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, elbow: Sign,
     a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     fore = a3 * a3 + d4 * d4
     K = (X * X + Z * Z - a2 * a2 - fore) / (2 * a2)
-    theta_3 = math.atan2(d4, a3) + elbow * atan2(_root(fore - K * K, fore), K)
+    theta_3 = math.atan2(d4, a3) + elbow * atan2(root(fore - K * K, fore), K)
     u = a2 + a3 * cos(theta_3) + d4 * sin(theta_3)
     v = a3 * sin(theta_3) - d4 * cos(theta_3)
     theta_2 = atan2(-Z, X) - atan2(v, u)
@@ -135,7 +135,7 @@ def solve_elbow(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, elbow: Sign,
 def solve_slide(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, forwards: Sign, free: Scalar) -> Vector:
     """Return angle 2 and the length of the slide that reach (X, Z) from joint 2; ``free`` where that is 0, 0."""
     square, f = X * X + Z * Z, geometry.forearm[0]
-    length = forwards * _root(square - f * f, square)
+    length = forwards * root(square - f * f, square)
     theta_2 = atan2(X * length - Z * f, X * f + Z * length)
     return [select(square < ON_AXIS**2, free, theta_2), length]
 
@@ -161,5 +161,6 @@ def _positive(x: Scalar) -> Scalar:
     return select(x > 0, x, 0.0)
 
 
-def _root(radicand: Scalar, terms: Scalar) -> Scalar:
+def root(radicand: Scalar, terms: Scalar) -> Scalar:
+    """Return the root of a difference of such ``terms``; 0 where it is so small that rounding has made it."""
     return sqrt(select(radicand < _VANISHING * terms, 0.0, radicand))

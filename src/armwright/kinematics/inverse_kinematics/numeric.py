@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward, link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, pose_errors, rank
 from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, midpoints, nearest_equivalent
-from armwright.kinematics.inverse_kinematics.solution import InverseSolution
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
 from armwright.kinematics.jacobians import frame_columns
 from armwright.spatial.rotations import rotation_vector
 
@@ -21,16 +21,17 @@ from armwright.spatial.rotations import rotation_vector
 _STARTS = 48
 _ROUNDS = 5
 _STEPS = 150
+# What a rotation by one radian is worth, in parts of the size of the arm; and where an arm of few joints cannot turn
+# the tool to a pose, so that it comes to its position at least.
+_WEIGHT, _POSITION_FIRST = 0.25, 1e-3
 # A residual this small, in parts of the size of the arm, is rounding.
 _ROUNDING = 1e-15
 # A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
 _STILL = 1e-9
 # The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
-# An arm of fewer joints cannot turn its tool as it likes.
-_FULL = 6
-# What a rotation by one radian is worth beside the size of the arm where the position comes first.
-_LIGHT = 1e-4
+# Joints that a pose takes.
+_POSE = 6
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
 _SAME_CONFIGURATION = 1e-5
 # A joint motion is taken for free where the tool is not moved by it to first order (singular values below this part
@@ -48,6 +49,7 @@ class _Task:
         X: (4, 4) the pose, or (k, 4, 4), one for each of k configurations.
         lower: (n,) lower bounds, may be infinite.
         upper: (n,) upper bounds.
+        weight: what a rotation by one radian is worth, in parts of the size of the arm.
         size: how long the arm is, for what is small [m].
         length: what a rotation by one radian is worth [m].
     """
@@ -56,8 +58,9 @@ class _Task:
     X: Array
     lower: Array
     upper: Array
+    weight: float = _WEIGHT
     size: float = attrs.field(init=False)
-    length: float = attrs.field()
+    length: float = attrs.field(init=False)
 
     @size.default
     def _size(self) -> float:
@@ -71,7 +74,7 @@ class _Task:
 
     @length.default
     def _length(self) -> float:
-        return max(self.size / 4, POSE_TOLERANCE)
+        return max(self.size * self.weight, POSE_TOLERANCE)
 
 
 def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
@@ -80,9 +83,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
     limits hold during the search. When no start leads to the pose the search is made again without limits, to
     distinguish a pose that only the limits exclude from one that is out of reach; then the configuration with the least
-    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length. An arm of
-    fewer than six joints cannot turn its tool as it likes: where it reaches the position, the configuration is the one
-    that turns the tool nearest to the orientation there.
+    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length; with fewer
+    than six joints, which cannot turn the tool to every pose, as good as nothing: the tool comes to the position.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
@@ -104,12 +106,37 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         reached = np.array([nearest_equivalent(arm, q, near) for q in _reaching(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
     if not len(reached):
+        if arm.n < _POSE:
+            free = attrs.evolve(free, weight=_POSITION_FIRST)
+            tried = _descend(free, tried)
         distances, angles = pose_errors(arm, tried, X)
-        order = np.hypot(distances, limited.length * angles).argsort()
-        turned = _turned_least(arm, X, tried[order[:_STARTS]]) if arm.n < _FULL else None
-        best = nearest_equivalent(arm, tried[order[0]] if turned is None else turned, near)
+        best = nearest_equivalent(arm, tried[np.hypot(distances, free.length * angles).argmin()], near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
-    return rank(arm, X, _named(limited, reached, near), near, apart=_SAME_CONFIGURATION)
+    return ranked(arm, X, near, reached)
+
+
+def search_from(arm: Arm, X: Array, near: Array, starts: Array, *, more: bool) -> Array:
+    """Return the configurations (l, n) that meet one pose, sought from starts (k, n), whatever the limits.
+
+    Args:
+        arm: any arm.
+        X: (4, 4) tool pose in the base frame.
+        near: (n,) the present joint positions.
+        starts: (k, n) joint positions.
+        more: whether to search within the limits as well, as ``numeric_inverse`` does.
+    """
+    free = _unlimited(arm, X)
+    reached = _reaching(free, _descend(free, starts)) if len(starts) else np.empty((0, arm.n))
+    reached = np.array([nearest_equivalent(arm, q, near) for q in reached]).reshape(-1, arm.n)
+    if more:
+        limited = _Task(arm=arm, X=X, lower=arm.limits.lower, upper=arm.limits.upper)
+        reached = np.concatenate([reached, _search(limited, near)[1]])
+    return reached
+
+
+def ranked(arm: Arm, X: Array, near: Array, reached: Array) -> InverseSolution:
+    """Return the solution made of configurations (k, n) that meet a pose, numbered."""
+    return rank(arm, X, _named(_unlimited(arm, X), reached, near), near, apart=_SAME_CONFIGURATION)
 
 
 def descend_from(arm: Arm, X: Array, near: Array) -> Array:
@@ -125,17 +152,15 @@ def descend_from(arm: Arm, X: Array, near: Array) -> Array:
     return _descend(_unlimited(arm, X), near)
 
 
-def _turned_least(arm: Arm, X: Array, near: Array) -> Array | None:
-    """Return the configuration that takes the tool to the position of a pose, and nearest to its orientation.
+def free_joints(arm: Arm, X: Array, q: Array) -> tuple[int, ...]:
+    """Return the numbers of the joints that can move, together, without moving the tool; none of a redundant arm.
 
-    None where the position itself is out of reach. A rotation is worth so little that it moves the tool less than the
-    tolerance of a pose.
+    Args:
+        arm: any arm.
+        X: (4, 4) the pose of its tool.
+        q: (n,) a configuration there.
     """
-    task = _unlimited(arm, X)
-    ends = _descend(attrs.evolve(task, length=_LIGHT * task.size), near)
-    distances, angles = pose_errors(arm, ends, X)
-    there = distances <= POSE_TOLERANCE
-    return ends[there][angles[there].argmin()] if there.any() else None
+    return _free_joints(_unlimited(arm, X), q)
 
 
 def _unlimited(arm: Arm, X: Array) -> _Task:
@@ -162,7 +187,7 @@ def _named(task: _Task, reached: Array, near: Array) -> list[Candidate]:
     """Number the configurations, nearest first, one of each free family."""
     solutions: list[Candidate] = []
     nearest = (nearest_equivalent(task.arm, q, near) for q in reached)
-    for q in sorted(nearest, key=lambda q: joint_distance(task.arm, near, q)):
+    for q in sorted(nearest, key=lambda q: (bool(violations(task.arm, q)), joint_distance(task.arm, near, q))):
         if any(_same(task.arm, q, other) for other in solutions):
             continue
         solutions.append(Candidate(q, f"numeric {len(solutions) + 1}", _free_joints(task, q)))

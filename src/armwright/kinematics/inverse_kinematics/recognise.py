@@ -10,73 +10,25 @@ import math
 from functools import lru_cache
 from typing import Any
 
-import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward_kinematics import link_frames, tool_frame
+from armwright.kinematics.inverse_kinematics.axes import (
+    SAME,
+    Axes,
+    are_parallel,
+    are_perpendicular,
+    joint_axes,
+    meeting,
+)
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Family, rotated_about_y
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 
-# Lines this close to a right angle, to one direction or to one point are so: typed numbers multiplied a few times
-# [rad] and [m].
-_SAME = 1e-10
 # From a frame whose z, y, z turns the last three joints of a spherical wrist are, to one whose y, z, y turns those of
 # three parallel axes are: z and y change places, x turns round.
 _SWAP = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Axes:
-    """The joint axes at joint positions 0, in the base frame.
-
-    Attributes:
-        kinds: one letter per joint, R or P.
-        points: (n, 3) a point on each axis [m].
-        directions: (n, 3) unit vectors.
-        X_BT: (4, 4) the tool at joint positions 0.
-    """
-
-    kinds: str
-    points: Array
-    directions: Array
-    X_BT: Array
-
-
-def _joint_axes(arm: Arm) -> Axes:
-    """Return the joint axes of an arm at joint positions 0."""
-    frames = link_frames(arm, [0.0] * arm.n)
-    return Axes(
-        kinds="".join("R" if joint.revolute else "P" for joint in arm.joints),
-        points=np.array([p for _, p in frames[:-1]]),
-        directions=np.array([[row[2] for row in R] for R, _ in frames[:-1]]),
-        X_BT=homogeneous(*tool_frame(arm, frames[-1])),
-    )
-
-
-def _parallel(u: Array, v: Array) -> bool:
-    """Whether two unit vectors have one direction or opposite ones."""
-    return float(np.linalg.norm(np.cross(u, v))) < _SAME
-
-
-def _perpendicular(u: Array, v: Array) -> bool:
-    """Whether two unit vectors are at a right angle."""
-    return abs(float(u @ v)) < _SAME
-
-
-def _meeting(p: Array, u: Array, q: Array, v: Array) -> Array | None:
-    """Return the point (3,) where the line through p along u meets that through q along v; None where they do not.
-
-    Parallel lines do not meet, not even when they are one.
-    """
-    normal = np.cross(u, v)
-    square = float(normal @ normal)
-    if math.sqrt(square) < _SAME or abs(float((q - p) @ normal)) > _SAME * math.sqrt(square):
-        return None
-    return np.asarray(p + u * (np.cross(q - p, v) @ normal) / square)
 
 
 @lru_cache(maxsize=64)  # asked for at every solve, and an arm does not change
@@ -96,44 +48,32 @@ def find_geometry(arm: Arm) -> ClosedFormGeometry | None:
     Args:
         arm: any arm.
     """
-    if arm.n != 6:
-        return None
-    axes = _joint_axes(arm)
+    return geometry_of(joint_axes(arm)) if arm.n == 6 else None
+
+
+def geometry_of(axes: Axes) -> ClosedFormGeometry | None:
+    """Return the build that six joint axes have, as ``find_geometry`` does of an arm."""
     w = axes.directions
-    if axes.kinds not in ("RRRRRR", "RRPRRR") or not _perpendicular(w[0], w[1]) or not _perpendicular(w[4], w[5]):
+    if axes.kinds not in ("RRRRRR", "RRPRRR") or not are_perpendicular(w[0], w[1]) or not are_perpendicular(w[4], w[5]):
         return None
     if (wrist := _wrist_centre(axes)) is not None:
         if axes.kinds == "RRPRRR":
-            return _with_slide(axes, wrist) if _perpendicular(w[1], w[2]) else None
-        if _parallel(w[1], w[2]):
+            return _with_slide(axes, wrist) if are_perpendicular(w[1], w[2]) else None
+        if are_parallel(w[1], w[2]):
             return _with_elbow(axes, wrist)
-    if axes.kinds == "RRRRRR" and _parallel(w[1], w[2]) and _parallel(w[1], w[3]) and _perpendicular(w[3], w[4]):
-        crossing = _meeting(axes.points[4], w[4], axes.points[5], w[5])
+    three = axes.kinds == "RRRRRR" and are_parallel(w[1], w[2]) and are_parallel(w[1], w[3])
+    if three and are_perpendicular(w[3], w[4]):
+        crossing = meeting(axes.points[4], w[4], axes.points[5], w[5])
         return None if crossing is None else _with_parallel_axes(axes, crossing)
     return None
 
 
-def closed_form_geometry(arm: Arm) -> ClosedFormGeometry:
-    """Return the build of an arm, as ``find_geometry`` does.
-
-    Raises:
-        UnsupportedArmError: it has no closed form.
-    """
-    geometry = find_geometry(arm)
-    if geometry is None:
-        raise UnsupportedArmError(
-            f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560, stanford or ur5 "
-            "(6 joints; a spherical wrist or three parallel axes)"
-        )
-    return geometry
-
-
 def _wrist_centre(axes: Axes) -> Array | None:
     p, w = axes.points, axes.directions
-    if not _perpendicular(w[3], w[4]):
+    if not are_perpendicular(w[3], w[4]):
         return None
-    centre = _meeting(p[3], w[3], p[4], w[4])
-    if centre is None or float(np.linalg.norm(np.cross(p[5] - centre, w[5]))) > _SAME:
+    centre = meeting(p[3], w[3], p[4], w[4])
+    if centre is None or float(np.linalg.norm(np.cross(p[5] - centre, w[5]))) > SAME:
         return None
     return centre
 
@@ -144,7 +84,7 @@ class _ShoulderView:
     def __init__(self, axes: Axes, centre: Array) -> None:
         p, z, y = axes.points, axes.directions[0], axes.directions[1]
         origin = p[0] + z * float((p[1] - p[0]) @ z)
-        if float((centre - origin) @ y) < -_SAME:
+        if float((centre - origin) @ y) < -SAME:
             y = -y
         R = nearest_rotation(np.stack([np.cross(y, z), y, z], axis=-1))
         self.X_BS = homogeneous(R, origin)
@@ -181,12 +121,12 @@ def _with_elbow(axes: Axes, wrist: Array) -> ClosedFormGeometry | None:
     view = _ShoulderView(axes, wrist)
     upper = view.segment(view.points[1], view.points[2])
     fore = view.segment(view.points[2], view.centre)
-    if min(math.hypot(*upper), math.hypot(*fore)) < _SAME:
+    if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
         return None
     raised = _heading(*upper)
     axis_4 = view.directions[3]
     # The forearm's own z is the axis of joint 4, where that stays in the plane of the arm.
-    flat = abs(float(axis_4[1])) < _SAME
+    flat = abs(float(axis_4[1])) < SAME
     folded = math.atan2(axis_4[0], axis_4[2]) if flat else raised
     R_3W, offset_4, offset_5, R_SW = _wrist(view, folded, flat)
     return view.geometry(
@@ -205,12 +145,12 @@ def _with_slide(axes: Axes, wrist: Array) -> ClosedFormGeometry:
     along = view.directions[2]
     raised = math.atan2(along[0], along[2])
     beside, length = rotated_about_y(-raised, *view.segment(view.points[1], view.centre))
-    R_3W, offset_4, offset_5, R_SW = _wrist(view, raised, _parallel(view.directions[3], along))
+    R_3W, offset_4, offset_5, R_SW = _wrist(view, raised, are_parallel(view.directions[3], along))
     return view.geometry(
         "stanford",
         signs=(1, view.sign(2), 1, 1, 1, 1),
         offsets=(0, raised, length, offset_4, offset_5, 0),
-        forearm=(float(beside) if abs(beside) > _SAME else 0.0, 0.0),
+        forearm=(float(beside) if abs(beside) > SAME else 0.0, 0.0),
         R_3W=R_3W,
         R_SW=R_SW,
     )
@@ -220,7 +160,7 @@ def _with_parallel_axes(axes: Axes, crossing: Array) -> ClosedFormGeometry | Non
     view = _ShoulderView(axes, crossing)
     upper = view.segment(view.points[1], view.points[2])
     fore = view.segment(view.points[2], view.points[3])
-    if min(math.hypot(*upper), math.hypot(*fore)) < _SAME:
+    if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
         return None
     raised, folded = _heading(*upper), _heading(*fore)
     axis_5 = view.directions[4]

@@ -26,7 +26,7 @@ _TURN = 2 * np.pi
 # Whole turns by which positions are shifted where another joint reaches a limit.
 _WHOLE_TURNS = np.arange(-2, 3)
 # Joints that are together this far outside their limits are inside [rad] or [m].
-_INSIDE = 1e-10
+INSIDE = 1e-10
 
 
 def search_within_limits(arm: Arm, q: Array, near: Array, members: Members, *, joint: int) -> Array:
@@ -57,13 +57,13 @@ def _search(arm: Arm, near: Array, members: Members, joint: int, interval: tuple
     values, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
     for _ in range(_CLOSER):
         rows = members(_with_joint(near, joint, values))
-        excess = _excess(arm, rows)
-        inside = np.flatnonzero(excess < _INSIDE)
+        beyond = excess(arm, rows)
+        inside = np.flatnonzero(beyond < INSIDE)
         if inside.size:
             return nearest_equivalent(arm, rows[inside[np.abs(values[inside] - start).argmin()]], near)
-        around = np.pad(excess, 1, constant_values=np.inf)
-        low = np.flatnonzero((excess <= around[:-2]) & (excess <= around[2:]))
-        low = low[excess[low].argsort(kind="stable")][:_LEAST]
+        around = np.pad(beyond, 1, constant_values=np.inf)
+        low = np.flatnonzero((beyond <= around[:-2]) & (beyond <= around[2:]))
+        low = low[beyond[low].argsort(kind="stable")][:_LEAST]
         fan = np.linspace(-width, width, 2 * _FINER + 1)
         values, width = np.unique(np.clip(values[low][:, None] + fan, lower, upper)), width / _FINER
     return None
@@ -95,7 +95,7 @@ def counter_rotate_within_limits(arm: Arm, q: Array, near: Array, members: Membe
     turns = turns[(turns >= lower - start) & (turns <= upper - start)]
     turns = turns[np.abs(turns).argsort(kind="stable")]
     rows = members(_with_joint(near, joint, start + turns))
-    inside = np.flatnonzero(_excess(arm, rows) < _INSIDE)
+    inside = np.flatnonzero(excess(arm, rows) < INSIDE)
     return nearest_equivalent(arm, rows[inside[0]], near) if inside.size else q
 
 
@@ -117,16 +117,16 @@ def _interval(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, fl
     return max(limits.lower, start - turn), min(limits.upper, start + turn)
 
 
-def _excess(arm: Arm, q: Array) -> Array:
-    """Return the sums (k,) by which joints of configurations (k, n) exceed limits, after shifts by revolutions."""
-    total = np.zeros(len(q))
-    for joint, values in zip(arm.joints, q.T, strict=True):
+def excess(arm: Arm, q: Array) -> Array:
+    """Return the sums (...) by which joints of configurations (..., n) exceed limits, after shifts by revolutions."""
+    total = np.zeros(q.shape[:-1])
+    for joint, values in zip(arm.joints, np.moveaxis(q, -1, 0), strict=True):
         lower, upper = joint.limits.lower, joint.limits.upper
         beyond = np.maximum(np.maximum(lower - values, values - upper), 0.0)
         if joint.revolute and np.isfinite(upper - lower):
             aside = np.remainder(values - (lower + upper) / 2 + np.pi, 2 * np.pi) - np.pi
             beyond = np.maximum(np.abs(aside) - (upper - lower) / 2, 0.0)
         elif joint.revolute:
-            beyond = np.zeros(len(q))
+            beyond = np.zeros(q.shape[:-1])
         total += beyond
     return total

@@ -83,6 +83,7 @@ class Branch:
         free: numbers of the joints that may rotate together without moving the tool, from 1; empty unless singular.
         position_error: distance of the tool from the goal [m].
         rotation_error: angle of the tool from the orientation of the goal [rad].
+        swivel: of an arm of seven joints with a closed form: see ``swivel_of`` [rad] or [m].
     """
 
     q: Array = attrs.field(converter=read_only, eq=array_key)
@@ -91,6 +92,7 @@ class Branch:
     free: tuple[int, ...] = ()
     position_error: float = 0.0
     rotation_error: float = 0.0
+    swivel: float | None = None
 
     __reduce__ = reduce_by_fields
 

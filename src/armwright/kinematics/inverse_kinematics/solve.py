@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -10,39 +9,52 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions, single_configuration
 from armwright.arrays import Array, ArrayLike, Flags, leading_axes
-from armwright.kinematics.forward_kinematics import per_joint, stack
-from armwright.kinematics.inverse_kinematics.branches import BRANCHES, Branches, branches, merged, single_branch
-from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
-from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Signs, rotated_about_y
-from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
+from armwright.errors import UnsupportedArmError
+from armwright.kinematics.forward_kinematics import forward, per_joint, stack
+from armwright.kinematics.inverse_kinematics.branches import Branches, ClosedForm, merged
+from armwright.kinematics.inverse_kinematics.builds import OfBuild, wrist_pose
+from armwright.kinematics.inverse_kinematics.candidates import (
+    POSE_TOLERANCE,
+    Candidate,
+    exact_pose,
+    pose_errors,
+    rank,
+    typed_poses,
+)
+from armwright.kinematics.inverse_kinematics.closed_forms import closed_form_of, find_closed_form
+from armwright.kinematics.inverse_kinematics.decompositions import Scara
+from armwright.kinematics.inverse_kinematics.every_solution import every_solution
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse_kinematics.numeric import descend_from, free_joints, numeric_inverse
 from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
-from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
+from armwright.kinematics.inverse_kinematics.redundancy import Choice, redundant_candidates
+from armwright.kinematics.inverse_kinematics.redundant import Redundant
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
 from armwright.tracing.scalar import select
 
-# Joint positions closer than this are the same configuration.
-_SAME_CONFIGURATION = 1e-9
-# Which joints move together, from 1, where a choice is left open: the turn of joint 1, the raising of joint 2, the
-# wrist; and the joint that then chooses.
-_FREE = {"spherical": ((1, 4, 5, 6), (2, 4, 5, 6), (4, 6)), "parallel": ((1, 2, 3, 4, 5, 6), (2, 4), (2, 3, 4, 6))}
-_CHOOSERS = {"spherical": (1, 2, 4), "parallel": (1, 2, 6)}
+# Joint positions closer than this are the same configuration; of an arm whose closed form finds the place of the tool
+# without its orientation, or is polished afterwards, at the edge of the reach half of the digits are gone.
+_SAME_CONFIGURATION, _SAME_POLISHED = 1e-9, 1e-6
+# A configuration whose tool is between these distances from its pose is polished [m], [rad].
+_EXACT, _CLOSE = 1e-12, 1e-3
 
 
 def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> tuple[Array, Flags]:
-    """Return all eight IK branches of many poses at once, without ranking them.
+    """Return all k IK branches of many poses at once, without ranking them: eight of six joints.
 
     Args:
-        arm: an arm of 6 joints with a closed form: see ``find_geometry``.
+        arm: an arm of n joints with a closed form: see ``find_closed_form``.
         X_BT: (..., 4, 4) tool poses in the base frame.
-        near: (..., 6) joint positions; angles come back within 180 deg of it, and a free joint takes its
-            value from it; the middle of the limits when left out.
+        near: (..., n) joint positions; angles come back within 180 deg of it, and a free joint takes its
+            value from it; the middle of the limits when left out. Of an arm of seven joints the branches are those
+            with its swivel, or with its position of the joint that is held.
 
     Returns:
-        q: (..., 8, 6) joint positions, branches in the order of ``BRANCHES``. Where a pose has some of them only, the
+        q: (..., k, n) joint positions, branches in the order of their signs. Where a pose has some of them only, the
             others repeat the first that it has; a pose out of reach gives the configurations that stretch towards it.
-        singular: (..., 8) whether a joint is free there.
+        singular: (..., k) whether a joint is free there.
 
     Raises:
         KindError: ``arm`` is no arm, or an array something else than real numbers.
@@ -50,24 +62,33 @@ def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
         ShapeError: a shape does not fit.
         InvalidValueError: a number is not finite, or a pose none.
     """
-    geometry = closed_form_geometry(known_arm(arm))
+    form = closed_form_of(known_arm(arm))
     X_BT, near = typed_poses(X_BT), mid_range(arm) if near is None else positions(arm, near, "near")
-    lead, solutions = _branches(arm, geometry, X_BT, near)
+    lead, solutions = _branches(arm, form, X_BT, near)
     q, singular = merged(solutions)
     return np.stack([stack(row, lead) for row in q], axis=-2), stack(singular, lead) > 0
 
 
-def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> InverseSolution:
+def inverse(
+    arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None, *, swivel: float | Choice = "nearest"
+) -> InverseSolution:
     """Return the configurations that put the tool at one pose, ranked.
 
-    With a closed form, see ``find_geometry``, these are all there are. Any other arm is solved step by step from many
-    starting configurations, see ``numeric_inverse``.
+    With a closed form, see ``find_closed_form``, these are all there are, and so they are of any other arm of six
+    joints, see ``every_solution``. What remains, arms of fewer or more joints without a closed form, is solved step by
+    step from many starting configurations, see ``numeric_inverse``.
+
+    Of an arm of seven joints with a closed form the branches at one swivel are returned: the angle of the elbow about
+    the line from shoulder to wrist, see ``swivel_of``, or the position of the joint that is held in its place.
 
     Args:
         arm: any arm, with n joints.
         X_BT: (4, 4) tool pose in the base frame; a rotation typed with few digits is made one.
         near: (n,) the present joint positions: an angle is wrapped to the nearest value inside its limits, and
             branches come nearest first; the middle of the limits when left out.
+        swivel: of an arm of seven joints: a value [rad] or [m], or for each branch one inside the limits: of those next
+            to that of ``near`` the one which the joints reach soonest (``nearest``), the ``middle`` of the widest
+            interval, or the one ``farthest`` from all limits.
 
     Returns:
         The branches, each labelled, with its limit violations and its residual, and the outcome on the whole.
@@ -76,91 +97,100 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
         KindError: ``arm`` is no arm, or an array something else than real numbers.
         ShapeError: a shape does not fit.
         InvalidValueError: a number is not finite, or the pose is none, not even one typed with two digits.
+        UnsupportedArmError: a swivel is given for an arm that has none.
 
     Source:
-        Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; spec of this project, mechanics §3.2.
+        Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; Elias & Wen (2022) for decomposition into
+        subproblems; Shimizu et al. (2008) for swivels; spec of this project, mechanics §3.2.
     """
     X = exact_pose(X_BT)
     reference = mid_range(known_arm(arm)) if near is None else single_configuration(arm, near, "near")
-    geometry = find_geometry(arm)
-    return numeric_inverse(arm, X, reference) if geometry is None else _closed(arm, geometry, X, reference)
+    form = find_closed_form(arm)
+    if isinstance(form, Redundant):
+        candidates = redundant_candidates(arm, form, X, reference, swivel)
+        if not candidates:
+            return numeric_inverse(arm, X, reference)
+        X_near = forward(arm, candidates[0].q)
+        met = len(candidates) > 1 or max(pose_errors(arm, candidates[0].q, X)) <= POSE_TOLERANCE
+        return rank(arm, X, candidates, reference, apart=_SAME_POLISHED, X_near=None if met else X_near)
+    if swivel != "nearest":
+        raise UnsupportedArmError(
+            f"arm '{arm.name}' has no swivel; expected an arm of 7 joints with a closed-form inverse"
+        )
+    if form is not None:
+        return _closed(arm, form, X, reference)
+    return every_solution(arm, X, reference) if arm.n == 6 else numeric_inverse(arm, X, reference)
 
 
-def label(geometry: ClosedFormGeometry, signs: Signs, angles: Array | Sequence[float]) -> str:
-    """Name a branch: arm, elbow or slide, wrist.
-
-    The elbow is up where it is above the line from joint 2 to the end of the forearm, above as the axis of joint 1
-    points. The wrist of a ``parallel`` arm is up where the angle 5 of its build is positive.
-    """
-    side, second, flip = signs
-    arm = "left" if side > 0 else "right"
-    if geometry.family == "stanford":
-        return f"{arm}, {'out' if second > 0 else 'back'}, {'no-flip' if flip > 0 else 'flip'}"
-    upper, _ = rotated_about_y(angles[1], geometry.upper_arm, 0.0)
-    fore, _ = rotated_about_y(angles[1] + angles[2], *geometry.forearm)
-    # With the wrist behind joint 2, as it is with the arm to the right, elbow above and elbow below change places.
-    elbow = "up" if second * (upper + fore) > 0 else "down"
-    if geometry.family == "parallel":
-        return f"shoulder {arm}, elbow {elbow}, wrist {'up' if flip > 0 else 'down'}"
-    return f"{arm}, {elbow}, {'no-flip' if flip > 0 else 'flip'}"
-
-
-def _branches(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, near: Array) -> tuple[tuple[int, ...], Branches]:
-    """Return the leading axes that poses (..., 4, 4) and joint positions (..., 6) share, and the branches."""
+def _branches(arm: Arm, form: ClosedForm, X_BT: Array, near: Array) -> tuple[tuple[int, ...], Branches]:
+    """Return the leading axes that poses (..., 4, 4) and joint positions (..., n) share, and the branches."""
     lead = leading_axes("pose, near", (X_BT, near), (X_BT.shape[:-2], near.shape[:-1]))
     X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
     R = [per_joint(X_BT[..., i, :3]) for i in range(3)]
-    return lead, branches(arm, geometry, R, per_joint(X_BT[..., :3, 3]), per_joint(near))
+    return lead, form.branches(arm, R, per_joint(X_BT[..., :3, 3]), per_joint(near))
 
 
-def _configurations(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, near: Array) -> tuple[Array, Array, Array]:
-    """Return eight configurations (..., 8, 6), which choices are free (..., 8, 3), and reach errors (..., 8) [m]."""
-    lead, solutions = _branches(arm, geometry, X_BT, near)
+def _configurations(arm: Arm, form: ClosedForm, X_BT: Array, near: Array) -> tuple[Array, Array, Array]:
+    """Return configurations (..., k, n), which choosers are free (..., k, c), and reach errors (..., k) [m]."""
+    lead, solutions = _branches(arm, form, X_BT, near)
     free = [stack([select(choice, 1.0, 0.0) for choice in choices], lead) > 0 for choices in solutions.free]
     q = np.stack([stack(each, lead) for each in solutions.q], axis=-2)
     return q, np.stack(free, axis=-2), stack(solutions.reach_error, lead)
 
 
-def _closed(arm: Arm, geometry: ClosedFormGeometry, X: Array, near: Array) -> InverseSolution:
+def _closed(arm: Arm, form: ClosedForm, X: Array, near: Array) -> InverseSolution:
     target, X_near = X, None
-    configurations, free, errors = _configurations(arm, geometry, X, near)
+    configurations, free, errors = _configurations(arm, form, X, near)
+    if not isinstance(form, OfBuild):
+        configurations, errors = _polished(arm, X, configurations, errors)
     if errors.min() > POSE_TOLERANCE:
-        target = _nearest_pose(geometry, X)
-        configurations, free, errors = _configurations(arm, geometry, target, near)
-        X_near = target if np.linalg.norm(target[:3, 3] - X[:3, 3]) > POSE_TOLERANCE else None
-    kind = "parallel" if geometry.family == "parallel" else "spherical"
+        if not isinstance(form, OfBuild | Scara):
+            return numeric_inverse(arm, X, near)
+        target = _nearest_pose(form.geometry, X) if isinstance(form, OfBuild) else form.nearest_pose(X)
+        configurations, free, errors = _configurations(arm, form, target, near)
+        X_near = target if max(pose_errors(arm, configurations[errors.argmin()], X)) > POSE_TOLERANCE else None
     candidates = []
     for i in np.flatnonzero(errors <= max(POSE_TOLERANCE, errors.min())):
         q = nearest_equivalent(arm, configurations[i], near)
-        together = [joints for joints, is_free in zip(_FREE[kind], free[i], strict=True) if is_free]
-        moving = {joint for joints in together for joint in joints}
-        choosers = [joint for joint, is_free in zip(_CHOOSERS[kind], free[i], strict=True) if is_free]
-        members = partial(_members, arm, geometry, target, int(i))
+        together = form.moving(free[i].tolist())
+        moving = set(free_joints(arm, X, q)) if together is None else together
+        choosers = [joint for joint, is_free in zip(form.choosers, free[i], strict=True) if is_free]
+        members = partial(_members, arm, form, target, int(i))
         for joint in choosers:
             outside = {fault.joint for fault in violations(arm, q)}
             # A joint outside its limits that does not move with the free one stays there, whatever that does.
             if not outside or outside - moving:
                 break
-            if kind == "spherical" and joint == _CHOOSERS[kind][-1] and len(together) == 1:
-                q = counter_rotate_within_limits(arm, q, near, members, joint=joint, other=_FREE[kind][-1][-1])
+            if moving == {4, 6} and isinstance(form, OfBuild):
+                q = counter_rotate_within_limits(arm, q, near, members, joint=joint, other=6)
             else:
                 q = search_within_limits(arm, q, near, members, joint=joint)
-        angles = np.array(geometry.angles(q.tolist()))
-        candidates.append(Candidate(q, label(geometry, BRANCHES[i], angles), tuple(sorted(moving))))
-    return rank(arm, X, candidates, near, apart=_SAME_CONFIGURATION, X_near=X_near)
+        candidates.append(Candidate(q, form.label(int(i), q), tuple(sorted(moving))))
+    apart = _SAME_CONFIGURATION if isinstance(form, OfBuild) else _SAME_POLISHED
+    return rank(arm, X, candidates, near, apart=apart, X_near=X_near)
 
 
-def _members(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, branch: int, near: Array) -> Array:
-    """Return the configurations (k, 6) of one branch near joint positions (k, 6), where a joint is free."""
+def _polished(arm: Arm, X: Array, q: Array, errors: Array) -> tuple[Array, Array]:
+    """Bring configurations (k, n) that miss a pose by a little, ``errors`` (k,), on to where they miss it least."""
+    rough = np.flatnonzero((errors > _EXACT) & (errors < _CLOSE))
+    if len(rough):
+        q, errors = q.copy(), errors.copy()
+        closer = descend_from(arm, X, q[rough])
+        distances, angles = pose_errors(arm, closer, X)
+        better = np.maximum(distances, angles) < errors[rough]
+        q[rough[better]], errors[rough[better]] = closer[better], np.maximum(distances, angles)[better]
+    return q, errors
+
+
+def _members(arm: Arm, form: ClosedForm, X_BT: Array, branch: int, near: Array) -> Array:
+    """Return the configurations (k, n) of one branch near joint positions (k, n), where a joint is free."""
     R = [X_BT[i, :3].tolist() for i in range(3)]
-    return stack(single_branch(arm, geometry, R, X_BT[:3, 3].tolist(), per_joint(near), branch=branch), near.shape[:-1])
+    return stack(form.branch(arm, R, X_BT[:3, 3].tolist(), per_joint(near), branch).q, near.shape[:-1])
 
 
 def _nearest_pose(geometry: ClosedFormGeometry, X_BT: Array) -> Array:
     """Return X_BT translated, not rotated, so that the wrist centre comes into reach."""
-    R_BS, p_BS = geometry.X_BS[:3, :3], geometry.X_BS[:3, 3]
-    R_ST = R_BS.T @ X_BT[:3, :3]
-    p = R_BS.T @ (X_BT[:3, 3] - p_BS) + R_ST @ geometry.p_TW
+    p, R = (np.array(x) for x in wrist_pose(geometry, X_BT[:3, :3].tolist(), X_BT[:3, 3].tolist()))
     X = X_BT.copy()
-    X[:3, 3] += R_BS @ (nearest_wrist_centre(geometry, p, R_ST @ geometry.R_T6) - p)
+    X[:3, 3] += geometry.X_BS[:3, :3] @ (nearest_wrist_centre(geometry, p, R) - p)
     return X
