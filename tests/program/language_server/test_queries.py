@@ -13,7 +13,7 @@ from armwright.program.api import analyse_flow
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import TextEdit, apply_edits
-from armwright.program.language.words import VOCABULARIES, Standard
+from armwright.program.language.words import VALUES, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.code_actions import all_fixes, quick_fixes
@@ -50,12 +50,13 @@ def labels(text: str, **how: Standard) -> list[str]:
 
 def test_every_word_is_explained() -> None:
     """Each word of the language and each function has a sentence, in the statements where it stands."""
-    for word in (*VOCABULARIES[Standard.RLO_2].reserved, *FUNCTIONS):
+    for word in (*VOCABULARIES[Standard.RLO_2].reserved, *FUNCTIONS, *VALUES):
         meaning = word_doc(word)
         assert meaning is not None, word
         assert word in meaning.syntax
         assert meaning.text.endswith(".")
-    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | {"VISIONS", "SYSTEM", "ZERO FORCE"}
+    in_context = {"VISIONS", "SYSTEM", "ZERO FORCE"}
+    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | VALUES | in_context
 
 
 @pytest.mark.parametrize(
@@ -148,7 +149,7 @@ HEAD = (
         ("WAIT |", ["e"]),
         ("IF n > 1 |", ["AND", "OR", "THEN"]),
         ("IF n > 1 THEN OPEN ARM_1 |", ["TO", "ELSE"]),
-        ("WHILE |", ["n", "DIST", "FORCE", "TORQUE", "NOT"]),
+        ("WHILE |", ["n", "DIST", "FORCE", "TORQUE"]),
         ("FOR n = 1 TO 3 |", ["STEP", "DO"]),
         ("put (|", ["ARM_1", "f", "g", "parts"]),
         ("put (f, |", ["n", "DIST", "FORCE", "TORQUE"]),

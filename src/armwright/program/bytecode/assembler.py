@@ -36,7 +36,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:-[0-9]+)?")
 _PASSING = re.compile(r"%[0-9]+")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _OPERAND_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|;.*|[^\s;]+')
-_ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z]+)(?P<rest>.*)")
+_ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z][A-Za-z0-9]*)(?P<rest>.*)")
 _SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
 _TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
 # What a file may ask for at most.

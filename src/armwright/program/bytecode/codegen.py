@@ -26,7 +26,7 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
         flow: the arms of its statements.
         spelling: how it writes its names.
     """
-    out = Emitter(source, symbols.units)
+    out = Emitter(source, symbols.scope(None))
     context = Context(GENERATORS, out, flow, spelling)
     context.generate(*program.statements)
     out.begin()
@@ -34,7 +34,7 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
     procedures = {}
     for procedure in program.procedures:
         own = symbols.procedures[procedure.name.key]
-        start = out.here.index
+        start, out.scope = out.here.index, symbols.scope(procedure.name.key)
         context.generate(*procedure.body.statements)
         out.begin()
         out.emit(Op.RET, span=procedure.body.end)

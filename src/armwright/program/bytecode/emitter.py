@@ -1,10 +1,14 @@
 """Writing instructions: places that are known later, values in passing, and the code of expressions."""
 
+import math
+
 import attrs
 
 from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand
 from armwright.program.language.source import Source, Span
-from armwright.program.language.units import UnitSystem, convert
+from armwright.program.language.units import convert
+from armwright.program.language.words import VALUES
+from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import pose_literals, tree
 
 # A place that will be known later.
@@ -15,11 +19,15 @@ _OPERATIONS |= {"<": Op.LT, "<=": Op.LE, "=": Op.EQ, "<>": Op.NE, ">=": Op.GE, "
 
 
 class Emitter:
-    """The instructions of a program so far."""
+    """The instructions of a program so far.
 
-    def __init__(self, source: Source, units: UnitSystem) -> None:
+    Attributes:
+        scope: the names that the present statements see.
+    """
+
+    def __init__(self, source: Source, scope: Scope) -> None:
         """Start with nothing."""
-        self.source, self.units = source, units
+        self.source, self.scope, self.units = source, scope, scope.symbols.units
         self.instructions: list[Instruction] = []
         self.constants: list[tuple[float, ...] | float] = []
         self._passing = 0
@@ -69,6 +77,8 @@ class Emitter:
             The operand that has the value: ``into`` if given.
         """
         match node:
+            case tree.Name(key=key) if key in VALUES and self.scope.is_value(key):
+                return self._value_of_language(node, into)
             case tree.Number() | tree.Name() | tree.ArmName():
                 operand = self.literal_value(node) if isinstance(node, tree.Number) else node.key
             case tree.Index(name=name, indices=indices):
@@ -77,12 +87,8 @@ class Emitter:
                 return self._chain(node, into)
             case tree.Matrix():
                 return self._matrix(node, into or self.passing())
-            case tree.Function(name=name, arguments=arguments):
-                operands = [self.value(argument) for argument in arguments]
-                if name.key == "TORQUE":
-                    # Force and moment are read by one operation.
-                    return self._operation(Op.FORCE, into or self.passing(), f"M{operands[0]}", node=node)
-                return self._operation(Op[name.key], into or self.passing(), *operands, node=node)
+            case tree.Function():
+                return self._function(node, into)
             case tree.Unary():
                 value = self.value(node.operand)
                 op = Op.NOT if node.operation == "NOT" else Op.NEG
@@ -95,6 +101,19 @@ class Emitter:
         """Write an operation; return where its result goes."""
         self.emit(op, to, *operands, span=node.span)
         return to
+
+    def _function(self, node: tree.Function, into: str | None) -> str:
+        operands = [self.value(argument) for argument in node.arguments]
+        to = into or self.passing()
+        if node.name.key == "TORQUE":
+            # Force and moment are read by one operation.
+            return self._operation(Op.FORCE, to, f"M{operands[0]}", node=node)
+        return self._operation(Op[node.name.key], to, *operands, node=node)
+
+    def _value_of_language(self, node: tree.Name, into: str | None) -> Operand:
+        if node.key == "TIME":
+            return self._operation(Op.TIME, into or self.passing(), node=node)
+        return math.pi if into is None else self._operation(Op.COPY, into, math.pi, node=node)
 
     def literal_value(self, node: tree.Number) -> float:
         """Return the value of a number literal in the units of the program."""

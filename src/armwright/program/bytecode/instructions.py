@@ -58,6 +58,31 @@ class Op(enum.StrEnum):
     ROTY = "ROTY", "P=N"
     ROTZ = "ROTZ", "P=N"
     DIST = "DIST", "N=PP"  # to, frame, frame
+    RPY = "RPY", "P=NNN"  # to, roll, pitch, yaw: a turn
+    ROT = "ROT", "P=NNNN"  # to, three components of an axis, angle: a turn
+    X = "X", "N=P"  # to, place or step: a coordinate
+    Y = "Y", "N=P"
+    Z = "Z", "N=P"
+    ROLL = "ROLL", "N=P"  # to, place or step: an angle about a fixed axis, x, then y, then z
+    PITCH = "PITCH", "N=P"
+    YAW = "YAW", "N=P"
+    ANGLE = "ANGLE", "N=P"  # to, place or step: the angle of its turn
+    AXISX = "AXISX", "N=P"  # to, place or step: a component of the axis of its turn
+    AXISY = "AXISY", "N=P"
+    AXISZ = "AXISZ", "N=P"
+    ABS = "ABS", "N=N"  # to, value
+    SQRT = "SQRT", "N=N"
+    ROUND = "ROUND", "N=N"
+    SIN = "SIN", "N=N"  # to, angle
+    COS = "COS", "N=N"
+    TAN = "TAN", "N=N"
+    ASIN = "ASIN", "N=N"  # to, value: an angle
+    ACOS = "ACOS", "N=N"
+    ATAN2 = "ATAN2", "N=NN"  # to, y, x: an angle
+    MOD = "MOD", "N=NN"  # to, dividend, divisor: the remainder
+    MIN = "MIN", "N=NN+"  # to, values: the smallest
+    MAX = "MAX", "N=NN+"
+    TIME = "TIME", "N="  # to: the time on the clock of the cell
     FORCE = "FORCE", "N=a"  # to, axis
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames

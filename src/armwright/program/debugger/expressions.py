@@ -15,7 +15,7 @@ from armwright.program.language.source import Source
 from armwright.program.semantics import type_check
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, TYPE_OF_KIND, ExpressionType, type_texts
 from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.semantics.symbols import PREDECLARED, Scope
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
@@ -37,11 +37,13 @@ class CheckedExpression:
         source: its text.
         node: what it says.
         type: what its value is; None for a whole array.
+        scope: the names it was checked with.
     """
 
     source: Source
     node: tree.Expression
     type: ExpressionType | None
+    scope: Scope
 
 
 def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
@@ -75,16 +77,16 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
     _raise_errors(tokens.diagnostics)
     if node is None or not tokens.is_at_end:
         raise ExpressionError(f"`{tokens.current.text}` does not belong here")
-    if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
-        return CheckedExpression(source=source, node=node, type=None)
     names = NameResolver(None)
     names.symbols.types = dict(types)
     names.symbols.units = machine.code.units
+    if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
+        return CheckedExpression(source=source, node=node, type=None, scope=names.scope)
     sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
-    return CheckedExpression(source=source, node=node, type=sort)
+    return CheckedExpression(source=source, node=node, type=sort, scope=names.scope)
 
 
 def evaluate(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> Value:
@@ -159,7 +161,7 @@ def _execute(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     Raises:
         ExpressionError: something in it has no value.
     """
-    emitter = Emitter(parsed.source, machine.code.units)
+    emitter = Emitter(parsed.source, parsed.scope)
     operand = emitter.value(parsed.node)
     steps, constants = tuple(emitter.instructions), tuple(emitter.constants)
     code = attrs.evolve(machine.code, instructions=steps, constants=constants, source=parsed.source)

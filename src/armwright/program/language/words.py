@@ -59,6 +59,9 @@ RLO_2_HEADERS = {
 RLO_2_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
 RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 
+# Values that need no argument. What a program, its procedures or its cell call so comes first.
+VALUES = frozenset(("PI", "TIME"))
+
 # What other languages call a statement, and what they have and RLO has not.
 FOREIGN_STATEMENTS = {
     **dict.fromkeys(("STOP", "EXIT", "QUIT", "ABORT"), "HALT"),

@@ -11,15 +11,16 @@ from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
-from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
+from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, STATEMENT_PHRASES, VALUES, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS
 from armwright.program.semantics.cell_symbols import WORLD
+from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
 from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -76,6 +77,7 @@ class _OperandRule:
         arms: whether an arm may.
         devices: whether a device may.
         functions: which functions of the language may.
+        values: which values of the language may.
         words: other words with a meaning at this position.
     """
 
@@ -83,14 +85,20 @@ class _OperandRule:
     arms: bool = False
     devices: bool = False
     functions: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
 
 
-_STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
-_MEASURES = ("DIST", *WITH_AXIS)
+_STEPS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.TRANS)
+_NUMBERS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.SCALAR)
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
-_ANY_VALUE = _OperandRule(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
-_NUMBER = _OperandRule(kinds=_SCALAR, functions=_MEASURES)
+_ANY_VALUE = _OperandRule(
+    kinds=frozenset(VariableKind) - {VariableKind.EVENT},
+    arms=True,
+    functions=tuple(FUNCTIONS),
+    values=tuple(sorted(VALUES)),
+)
+_NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=tuple(sorted(VALUES)))
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
 _TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
 _STEP = _OperandRule(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
@@ -121,8 +129,12 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     **dict.fromkeys(WITH_AXIS, _OperandRule(words=AXES)),
     "DIST": _POSE,
-    "INV": _STEP,
-    **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
+    **dict.fromkeys(("INV", *MEASURES), _STEP),
+    **{
+        name: _NUMBER
+        for name, signature in FUNCTIONS.items()
+        if signature.argument_types == ACCEPTED_TYPES[ExpressionType.SCALAR]
+    },
 }
 
 
@@ -153,7 +165,7 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
             items += [*factory.procedures(), *factory.names(_ANY_VALUE.kinds, starts=True)]
     else:
         items = [*factory.arms(operand), *factory.names(operand.kinds), *factory.devices(operand)]
-        items += [*factory.functions(operand), *factory.words(words)]
+        items += [*factory.functions(operand), *factory.values(operand), *factory.words(words)]
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
     return items
@@ -294,6 +306,11 @@ class _ItemFactory:
         for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
             cased, meaning = self._match_case(name), WORDS[name]
             yield self._item(cased, Kind.Function, f"{cased}($1)", meaning.syntax, meaning.text)
+
+    def values(self, operand: _OperandRule) -> Iterator[CompletionItem]:
+        """Give values of the language that nothing else is called like."""
+        for name in filter(self._scope.is_value, operand.values):
+            yield self._item(self._match_case(name), Kind.Constant, "", WORDS[name].syntax, WORDS[name].text)
 
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""

@@ -105,7 +105,7 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = key, [f"a unit of {dimension(key)}"]
         case NameKind.AXIS:
             description = key, [f"the {key.lower()} axis"]
-        case NameKind.FUNCTION | NameKind.SENSOR if (word := word_doc(key)) is not None:
+        case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             description = word.syntax + value, [word.text]
     return description

@@ -32,6 +32,7 @@ _NAME_STYLES = {
     NameKind.UNIT: ("type", _BIT["defaultLibrary"]),
     NameKind.SENSOR: ("keyword", 0),
     NameKind.AXIS: ("enumMember", _BIT["readonly"]),
+    NameKind.VALUE: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["scalar"]),
 }
 
 # A token in a line: its start and length in columns; its kind and modifiers as numbers.

@@ -31,6 +31,7 @@ class NameKind(enum.Enum):
     UNIT = "unit"
     SENSOR = "sensor"
     AXIS = "axis"
+    VALUE = "value of the language"
     UNKNOWN = "unknown name"
 
 
@@ -156,6 +157,7 @@ def _classify_variable(token: Token, scope: Scope) -> Occurrence:
     kind, declared = names.types.get(key), names.declared.get(key)
     if owner is None and kind is None and declared is None:
         what = NameKind.PROCEDURE if key in symbols.procedures else NameKind.UNKNOWN
+        what = NameKind.VALUE if scope.is_value(key) else what
         return Occurrence(token.start, token.end, key, what)
     declares = declared is not None and declared.span.start == token.start
     return Occurrence(token.start, token.end, key, NameKind.VARIABLE, owner, kind, declares)

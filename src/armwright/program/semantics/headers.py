@@ -7,7 +7,7 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
-from armwright.program.semantics.builtins import FUNCTIONS, PROCEDURES_MAY_HIDE
+from armwright.program.semantics.builtins import FIRST_FUNCTIONS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
@@ -136,7 +136,7 @@ def _report_unknown_unit(names: NameResolver, unit: tree.Name) -> None:
 def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadImport | None) -> None:
     path = header.path
     if read_import is None:
-        names.open_import = True
+        names.symbols.open_import = True
         note = "a name that is not declared may be one of them"
         message = f"the frames of `{path.value}` are unknown: the file was not read"
         names.report("W205", message, header.span, "not read", note=note)
@@ -145,7 +145,7 @@ def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadI
         brought = read_import(path.value)
     except ArmwrightError as error:
         # What the file would have brought is unknown, so nothing is asked of unknown names.
-        names.open_import = True
+        names.symbols.open_import = True
         names.report("E228", f"`{path.value}` cannot be imported", path.span, "not read", note=str(error))
         return
     names.imports.append(brought)
@@ -176,7 +176,7 @@ def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSy
     elif name.key in names.symbols.types:
         where = "an IMPORT brings" if name.key in names.symbols.imported else "is predeclared"
         names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
-    elif name.key in FUNCTIONS and name.key not in PROCEDURES_MAY_HIDE:
+    elif name.key in FIRST_FUNCTIONS:
         text = f"`{name.text}` is a function of the language"
         names.report("E203", text, name.span, "a procedure of the same name")
     else:

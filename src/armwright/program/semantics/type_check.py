@@ -116,6 +116,8 @@ def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
 
 
 def _name(names: NameResolver, node: tree.Name) -> ExpressionType | None:
+    if names.scope.is_value(node.key):
+        return ExpressionType.SCALAR
     kind = names.type(node)
     return None if kind is None else array_elements.variable_type(names, node, kind)
 

@@ -61,6 +61,10 @@ def _force(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], value, step.span)
 
 
+def _time(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], machine.now, step.span)
+
+
 HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
@@ -68,6 +72,7 @@ HANDLERS: Mapping[Op, Handler] = {
     **dict.fromkeys(OPERATIONS, _compute),
     Op.ELEM: _element,
     Op.FORCE: _force,
+    Op.TIME: _time,
 }
 
 

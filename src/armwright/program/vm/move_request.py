@@ -11,6 +11,8 @@ from armwright.program.vm.process import Guard, Process
 
 # The longest MOVE; more is a slip of units [s].
 _MAX_DURATION = 1e6
+# What may take a pose: of the operations in a condition all others take numbers.
+_READS_POSES = {op for op in Op if set("Pvt") & set(op.signature.partition("=")[2] or op.signature)}
 
 
 class Goal(NamedTuple):
@@ -117,6 +119,6 @@ def _guard(machine: Machine, part: Instruction) -> Guard:
         condition=condition,
         result=str(part.operands[1]),
         action=action,
-        reads_pose=not ops.isdisjoint((Op.DIST, Op.COPY, Op.MUL, Op.INV)),
+        reads_pose=not ops.isdisjoint(_READS_POSES),
         reads_force=Op.FORCE in ops,
     )
