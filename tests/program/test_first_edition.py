@@ -9,7 +9,7 @@ import pytest
 from armwright.program import Compilation, Source, compile as translate
 from armwright.program.bytecode.assembler import assembly
 from armwright.program.bytecode.instructions import Code, Instruction, Operand
-from armwright.program.language.words import VALUES
+from armwright.program.language.words import VALUES, WORDS_IN_CONTEXT
 from armwright.program.semantics.builtins import FUNCTIONS
 from program.shelf import BARE, HERE, compile_file
 
@@ -17,7 +17,7 @@ EXAMPLES = HERE.parents[1] / "examples"
 # Of each program the first 16 digits of the SHA-256 of its code, written by the last release before the second edition.
 DIGESTS = dict(reversed(line.split()) for line in (HERE / "corpus" / "first_edition.txt").read_text().splitlines())
 # Words of the second edition, which all may be names.
-WORDS = sorted((*FUNCTIONS, *VALUES))
+WORDS = sorted({*FUNCTIONS, *VALUES, *WORDS_IN_CONTEXT})
 # A program in which NAME is a variable of some type, read and written in every place where a variable may stand.
 SCALARS = """VAR NAME, OTHER : SCALAR ; LIST : ARRAY [3] OF SCALAR ; F : FRAME ;
 BEGIN

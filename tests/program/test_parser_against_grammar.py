@@ -16,7 +16,7 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
-from program.sentences import Sentences, mutants
+from program.sentences import IN_CONTEXT, Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
 from samples import Sample
 
@@ -26,12 +26,30 @@ NO_NAME = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
 SHALLOW = [path for path in (*ACCEPTED, *REJECTED) if path.parent.name != "depth"]
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *SHALLOW]
 WORDS = {
-    "NAME": ("f", "part", "slot", "n", "t", "hit", "visions", "mm", "x", "stop", "zero", "force", "torque"),
+    "NAME": (
+        "f",
+        "part",
+        "slot",
+        "n",
+        "t",
+        "hit",
+        "visions",
+        "mm",
+        "x",
+        "stop",
+        "zero",
+        "force",
+        "torque",
+        "const",
+        "text",
+        "boolean",
+    ),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),
     "ARM": ("ARM_1", "arm-2"),
     "VISIONS": ("VISIONS", "visions"),
     "ZERO": ("ZERO", "zero"),
+    **IN_CONTEXT,
     "UNITNAME": DECLARABLE,
     "RELOP": ("<", "<=", "<>", ">=", ">"),
     "ADDOP": ("+", "-"),

@@ -4,7 +4,7 @@ import math
 
 import attrs
 
-from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand
+from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand, Text
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import convert
 from armwright.program.language.words import VALUES
@@ -79,8 +79,12 @@ class Emitter:
         match node:
             case tree.Name(key=key) if key in VALUES and self.scope.is_value(key):
                 return self._value_of_language(node, into)
-            case tree.Number() | tree.Name() | tree.ArmName():
-                operand = self.literal_value(node) if isinstance(node, tree.Number) else node.key
+            case tree.Number():
+                operand: Operand = self.literal_value(node)
+            case tree.String(value=characters):
+                operand = Text(characters)
+            case tree.Name(key=key) | tree.ArmName(key=key):
+                operand = key
             case tree.Index(name=name, indices=indices):
                 operand = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
             case tree.Binary():
@@ -111,8 +115,11 @@ class Emitter:
         return self._operation(Op[node.name.key], to, *operands, node=node)
 
     def _value_of_language(self, node: tree.Name, into: str | None) -> Operand:
-        if node.key == "TIME":
-            return self._operation(Op.TIME, into or self.passing(), node=node)
+        if node.key != "PI":
+            to = into or self.passing()
+            if node.key == "TIME":
+                return self._operation(Op.TIME, to, node=node)
+            return self._operation(Op.LOADB, to, node.key, node=node)
         return math.pi if into is None else self._operation(Op.COPY, into, math.pi, node=node)
 
     def literal_value(self, node: tree.Number) -> float:
@@ -122,6 +129,10 @@ class Emitter:
     def _chain(self, node: tree.Binary, into: str | None) -> Operand:
         """Write the operations of a chain, one after the other."""
         first, chain = tree.operation_chain(node)
+        variable = None
+        if into is not None and not into.startswith("%") and any(link.operation in ("AND", "OR") for link in chain):
+            # The variable may be part of the condition: it gets its value when all of that is worked out.
+            variable, into = into, None
         # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
         targets: list[str | None] = []
         for link in reversed(chain):
@@ -136,7 +147,7 @@ class Emitter:
             else:
                 right = self.value(link.right)
                 left = self._operation(_OPERATIONS[link.operation], to or self.passing(), left, right, node=link)
-        return left
+        return left if variable is None else self._operation(Op.COPY, variable, left, node=node)
 
     def _joint(self, node: tree.Binary, to: str) -> str:
         """AND and OR look at the right side only where it matters: ``n > 0 AND a[n] > 2``."""

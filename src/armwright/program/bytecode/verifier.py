@@ -8,7 +8,7 @@ from typing import TypeAlias
 import attrs
 
 from armwright.errors import ArmwrightError
-from armwright.program.bytecode.instructions import Code, JumpTarget, Op, Operand
+from armwright.program.bytecode.instructions import Code, JumpTarget, Op, Operand, Text
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 
@@ -33,6 +33,7 @@ class Value(enum.Enum):
     NUMBER = "a number"
     TRUTH = "a truth value"
     POSE = "a pose or a transformation"
+    TEXT = "a text"
 
 
 @attrs.frozen
@@ -43,7 +44,13 @@ class Element:
 
 
 ValueType: TypeAlias = Value | Element
-OF_KIND = {VariableKind.SCALAR: Value.NUMBER, VariableKind.TRANS: Value.POSE, VariableKind.FRAME: Value.POSE}
+OF_KIND = {
+    VariableKind.SCALAR: Value.NUMBER,
+    VariableKind.TRANS: Value.POSE,
+    VariableKind.FRAME: Value.POSE,
+    VariableKind.BOOLEAN: Value.TRUTH,
+    VariableKind.TEXT: Value.TEXT,
+}
 _FRAME = VariableType(VariableKind.FRAME)
 
 
@@ -248,7 +255,7 @@ class Verifier:
     def value(self, state: State, operand: Operand) -> Value:
         """Return what the value of an operand is."""
         if not isinstance(operand, str):
-            return Value.NUMBER
+            return Value.TEXT if isinstance(operand, Text) else Value.NUMBER
         if operand.startswith("%") and isinstance(kept := self._passing(state, operand), Value):
             return kept
         kind = self.type_of(state, operand)

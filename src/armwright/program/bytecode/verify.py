@@ -33,22 +33,25 @@ from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
 _VALUES = {"N": (Value.NUMBER,), "C": (Value.NUMBER,), "P": (Value.POSE,), "T": (Value.TRUTH, Value.NUMBER)}
+_VALUES["W"] = (Value.TEXT,)
 _NAMES = {"F": VariableKind.FRAME, "S": VariableKind.SCALAR, "E": VariableKind.EVENT}
 # The words that an operand may be, and what is said of others.
 _WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "a": (("X", "Y", "Z", "MX", "MY", "MZ"), "{op} expects the axis X, Y or Z, or MX, MY or MZ, got {word}"),
     "o": (("ON", "OFF"), "{op} expects ON or OFF, got {word}"),
+    "b": (("TRUE", "FALSE"), "{op} expects TRUE or FALSE, got {word}"),
     "r": (("RIGIDLY",), "the last operand of {op} may only be RIGIDLY"),
 }
 # The forms of operands, by the letters of `_letter`.
 _FORMS: Mapping[str, str] = {
     "(": "(?:",
     ")": ")?",
-    "t": "[wqds]",
+    **dict.fromkeys("tx", "[wqds]"),
     "K": "k",
     **dict.fromkeys("nFSEC", "[wq]"),
     **dict.fromkeys("vNPT", "[wqd]"),
-    **dict.fromkeys("aor", "w"),
+    "W": "[wqs]",
+    **dict.fromkeys("aobr", "w"),
 }
 
 
@@ -123,7 +126,7 @@ def _need(verifier: Verifier, state: State, letter: str, operand: Operand) -> No
         verifier.need(state, operand, *_VALUES[letter])
     elif letter in _NAMES:
         verifier.need_name(state, operand, _NAMES[letter])
-    elif letter == "t" and not isinstance(operand, Text):
+    elif letter == "t":
         verifier.value(state, operand)
     elif letter in _WORDS:
         words, fault = _WORDS[letter]
@@ -209,6 +212,14 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     if left is not right or left is Value.TRUTH:
         raise verifier.wrong("MUL expects two numbers, or two poses or transformations")
     return Flow(verifier.write(state, to, left))
+
+
+def _compare(verifier: Verifier, state: State) -> Flow:
+    """EQ and NE compare numbers, or texts."""
+    left, right = (verifier.value(state, operand) for operand in verifier.operands[1:])
+    if left is not right or left not in (Value.NUMBER, Value.TEXT):
+        raise verifier.wrong(f"{verifier.op} expects two numbers or two texts")
+    return Flow(state)
 
 
 def _element(verifier: Verifier, state: State) -> Flow:
@@ -317,6 +328,7 @@ def _end_routine(verifier: Verifier, state: State) -> Flow:
 _RULES: Mapping[Op, Rule] = {
     Op.COPY: _copy,
     Op.MUL: _multiply,
+    **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
     Op.LOCK: _lock,

@@ -5,14 +5,13 @@ from armwright.program.flow_analysis.context import MAX_DEPTH, Context
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.lattice import EVERYTHING, Uncertainty
 from armwright.program.flow_analysis.state import LAST, Activation, Called, FlowState
-from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.kinds import BY_VALUE, VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 # Longest chain of calls that is analysed.
 _MAX_CALLS = 6
-_BY_VALUE = (VariableKind.SCALAR, VariableKind.TRANS)
 
 
 def call(context: Context, node: tree.Call) -> None:
@@ -73,7 +72,7 @@ def _require_arguments(state: FlowState, procedure: ProcedureSymbols, node: tree
     """Report arguments without a value, except variables that are passed by reference."""
     for parameter, argument in zip(procedure.parameters, node.arguments, strict=False):
         kind = procedure.types.get(parameter)
-        by_value = kind is not None and not kind.sizes and kind.kind in _BY_VALUE
+        by_value = kind is not None and not kind.sizes and kind.kind in BY_VALUE
         if by_value or not isinstance(argument, tree.Name | tree.Index):
             require_value(state, argument)
         else:

@@ -8,7 +8,7 @@ from armwright.program.syntax import tree
 
 def print_(state: FlowState, node: tree.Print) -> None:
     """Require a value of the items of a PRINT."""
-    require_value(state, *(item for item in node.items if not isinstance(item, tree.String)))
+    require_value(state, *node.items)
 
 
 STEPS: Steps = {tree.Print: of_state(print_)}

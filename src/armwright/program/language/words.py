@@ -60,7 +60,12 @@ RLO_2_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
 RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 
 # Values that need no argument. What a program, its procedures or its cell call so comes first.
-VALUES = frozenset(("PI", "TIME"))
+VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE"))
+
+# Types, and what starts a part in front of BEGIN, that are reserved nowhere: programs may use all of them as names.
+TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
+HEADERS_IN_CONTEXT = ("CONST",)
+WORDS_IN_CONTEXT = frozenset((*TYPES_IN_CONTEXT, *HEADERS_IN_CONTEXT))
 
 # What other languages call a statement, and what they have and RLO has not.
 FOREIGN_STATEMENTS = {
@@ -152,7 +157,7 @@ VOCABULARIES = {
         headers=("VAR", *RLO_2_HEADERS),
         statements=(*STATEMENTS, *RLO_2_STATEMENTS, "BEGIN"),
         block_ends=("END", "UNTIL", "COEND", "PRIORITY", "RECOVER", "ELSE"),
-        types=(*TYPES, "EVENT"),
+        types=(*TYPES, "EVENT", *TYPES_IN_CONTEXT),
         plain_clauses=(*PLAIN_CLAUSES, "ON"),
         with_clauses=(*WITH_CLAUSES, *RLO_2_WITH_CLAUSES),
         reserved=_RLO_83_RESERVED | _RLO_2_RESERVED,

@@ -11,7 +11,15 @@ from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
-from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, STATEMENT_PHRASES, VALUES, VOCABULARIES, Standard
+from armwright.program.language.words import (
+    BLOCK_CLOSERS,
+    SENSORS,
+    STATEMENT_PHRASES,
+    VALUES,
+    VOCABULARIES,
+    WORDS_IN_CONTEXT,
+    Standard,
+)
 from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
@@ -42,7 +50,8 @@ _SNIPPETS = {
     "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
-    "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,EVENT|} ;"),),
+    "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
+    "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
 # How a word that wants more is written on.
 _WORD_SNIPPETS = {
@@ -89,6 +98,7 @@ class _OperandRule:
     words: tuple[str, ...] = ()
 
 
+_TRUTHS = ("FALSE", "TRUE")
 _STEPS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.TRANS)
 _NUMBERS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.SCALAR)
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
@@ -98,7 +108,10 @@ _ANY_VALUE = _OperandRule(
     functions=tuple(FUNCTIONS),
     values=tuple(sorted(VALUES)),
 )
-_NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=tuple(sorted(VALUES)))
+_NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
+_CONDITION = _OperandRule(kinds=frozenset((VariableKind.SCALAR, VariableKind.BOOLEAN)), functions=_NUMBERS)
+_CONDITION = attrs.evolve(_CONDITION, values=("PI", "TIME", *_TRUTHS), words=("NOT",))
+_TEXT = _OperandRule(kinds=frozenset((VariableKind.TEXT,)), functions=("TEXT",))
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
 _TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
 _STEP = _OperandRule(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
@@ -108,11 +121,13 @@ _RULES_BY_KIND = {
     VariableKind.TRANS: _STEP,
     VariableKind.FRAME: _POSE,
     VariableKind.EVENT: _EVENT,
+    VariableKind.BOOLEAN: _CONDITION,
+    VariableKind.TEXT: _TEXT,
 }
 # By what the parser calls it in its messages.
 _RULES_BY_NAME: Mapping[str, _OperandRule] = {
     "a value or a text": _ANY_VALUE,
-    "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
+    "a condition": _CONDITION,
     **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
     **dict.fromkeys(("an index", "the name of a SCALAR"), _OperandRule(kinds=_SCALAR)),
     **dict.fromkeys(("a pose", "the name of a FRAME or an arm"), _POSE),
@@ -128,6 +143,7 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
 # What functions take.
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     **dict.fromkeys(WITH_AXIS, _OperandRule(words=AXES)),
+    "TEXT": _ANY_VALUE,
     "DIST": _POSE,
     **dict.fromkeys(("INV", *MEASURES), _STEP),
     **{
@@ -206,7 +222,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
     """Give the words that are valid at a position; of clauses those that go with the others of their MOVE."""
     following = takewhile(lambda token: token.key not in _CLAUSE_ENDS, context.following)
     written = expected.present_clauses | {token.key for token in following}
-    allowed = VOCABULARIES[std].reserved
+    allowed = VOCABULARIES[std].reserved | (WORDS_IN_CONTEXT if std is Standard.RLO_2 else frozenset())
     # What ends a block is not offered after each of its statements, unless it is being written.
     if not expected.starts_statement and context.word.start == context.word.end:
         allowed = allowed - BLOCK_CLOSERS - {"RECOVER"}

@@ -40,6 +40,12 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "SCALAR": ("name : SCALAR", "A number."),
     "TRANS": ("name : TRANS", "A transformation from one frame to another: a rotation and a translation."),
     "FRAME": ("name : FRAME", "A position and an orientation; a frame that is affixed to another one follows it."),
+    "BOOLEAN": ("name : BOOLEAN", "A condition: TRUE, FALSE, or what comparisons, AND, OR and NOT give."),
+    "TEXT": (
+        "name : TEXT",
+        "Characters, for messages; as a function, the text that PRINT would write of its arguments.",
+    ),
+    "CONST": ("CONST name = value ;", "Declares constants; the type of each is that of its value."),
     "EVENT": ("name : EVENT", "A counter of SIGNALs; WAIT waits until it is above 0 and subtracts one."),
     "ARRAY": (_ARRAY, "Declares an array, whose indices start at 1."),
     "OF": (_ARRAY, "Precedes the type of the elements."),
@@ -142,6 +148,8 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "MAX": ("MAX (a, b, ...)", "The largest of the numbers."),
     # values
     "PI": ("PI", "The number 3.14159..."),
+    "TRUE": ("TRUE", "The condition that holds."),
+    "FALSE": ("FALSE", "The condition that does not hold."),
     "TIME": ("TIME", "The time on the clock of the cell since the program began, in seconds."),
     # sensors
     "FORCE": ("FORCE (X | Y | Z)", "The force on the gripper of the moving arm along an axis of the world, in N."),

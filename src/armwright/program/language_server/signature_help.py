@@ -17,6 +17,7 @@ _PARAMETERS = {
     "XYZ": ("x", "y", "z"),
     "INV": ("step",),
     "DIST": ("frame", "frame"),
+    "TEXT": ("value",),
     "RPY": ("roll", "pitch", "yaw"),
     "ROT": ("x", "y", "z", "angle"),
     **dict.fromkeys(MEASURES, ("pose",)),

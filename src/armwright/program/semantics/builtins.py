@@ -43,12 +43,14 @@ _SCALARS = ACCEPTED_TYPES[ExpressionType.SCALAR]
 _FRAMES = ACCEPTED_TYPES[ExpressionType.FRAME]
 _POSES = ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME}
 _INVERTIBLE = _POSES | {ExpressionType.INVERSE}
+_PRINTABLE = frozenset(ExpressionType) - {ExpressionType.EVENT}
 _NUMBER, _TRANS = ExpressionType.SCALAR, ExpressionType.TRANS
 # Numbers out of poses: positions, angles of roll, pitch and yaw, and the one rotation about an axis.
 MEASURES = ("X", "Y", "Z", "ROLL", "PITCH", "YAW", "ANGLE", "AXISX", "AXISY", "AXISZ")
 FUNCTIONS: Mapping[str, Signature] = {
     "XYZ": Signature("three lengths", 3, _SCALARS, ExpressionType.TRANS, "length"),
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), Signature("one angle", 1, _SCALARS, ExpressionType.TRANS, "angle")),
+    "TEXT": Signature("a value or more", 1, _PRINTABLE, ExpressionType.TEXT, more=True),
     "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
     "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
     **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),

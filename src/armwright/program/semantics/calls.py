@@ -10,7 +10,12 @@ from armwright.program.language.words import FOREIGN_STATEMENTS, UNSUPPORTED_STA
 from armwright.program.semantics import type_check
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.expression_types import TYPE_OF_KIND, declared_type_phrase, quote_expression
+from armwright.program.semantics.expression_types import (
+    TYPE_OF_KIND,
+    declared_type_phrase,
+    quote_expression,
+    variable_phrase,
+)
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
@@ -100,7 +105,7 @@ def _check_argument(
     what = f"parameter `{_parameter_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
     if not kind.sizes:
         required = TYPE_OF_KIND[kind.kind]
-        type_check.require_type(names, argument, required, "E220", what + required.value)
+        type_check.require_type(names, argument, required, "E220", what + variable_phrase(required))
     elif not isinstance(argument, tree.Name):
         if (actual := type_check.infer_type(names, argument)) is not None:
             text = f"{what}an {kind}, but {quote_expression(argument)} is {actual.value}"

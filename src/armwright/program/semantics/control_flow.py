@@ -4,7 +4,13 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import ExpressionType, declared_type_phrase
 from armwright.program.semantics.quantities import check_range, check_unit
-from armwright.program.semantics.type_check import check_any, require_condition, require_quantity, require_type
+from armwright.program.semantics.type_check import (
+    check_any,
+    report_constant_assignment,
+    require_condition,
+    require_quantity,
+    require_type,
+)
 from armwright.program.syntax import tree
 
 
@@ -37,7 +43,9 @@ def for_(context: Context, node: tree.For) -> None:
         names.mark_used(variable.names)
     else:
         kind = names.type(variable)
-        if kind is not None and kind != VariableType(VariableKind.SCALAR):
+        if names.scope.is_constant(variable.key):
+            report_constant_assignment(names, variable)
+        elif kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
             message = f"FOR counts with a SCALAR, but `{variable.text}` is {declared_type_phrase(kind)}"
             names.report("E229", message, variable.span, str(kind), secondary=names.declaration_labels(variable.key))

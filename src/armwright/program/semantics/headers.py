@@ -7,10 +7,12 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
-from armwright.program.semantics.builtins import FIRST_FUNCTIONS
+from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
+from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
+from armwright.program.semantics.type_check import infer_type
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
@@ -38,6 +40,8 @@ def declare(names: NameResolver, program: tree.Program, read_import: ReadImport 
             _declare_import(names, header, read_import)
     for declaration in program.declarations:
         _declare_variables(names, names.symbols, declaration)
+    for constant in program.constants:
+        _declare_constant(names, constant)
     return [_declare_procedure(names, node) for node in program.procedures]
 
 
@@ -98,6 +102,40 @@ def _array_size(names: NameResolver, number: tree.Number) -> int | None:
         text = f"the size of an array must be an integer from 1, not {number.text}"
         names.report("E222", text, number.span, "no size")
     return None
+
+
+# ---- constants -----------------------------------------------------------------------------------------------------
+
+
+def _declare_constant(names: NameResolver, node: tree.Constant) -> None:
+    """Take up a constant: its type is that of its value, which is made of numbers and constants in front of it."""
+    name, kind, symbols = node.name, _constant_type(names, node), names.symbols
+    if name.key in symbols.declared:
+        _report_duplicate(names, name, symbols.declared[name.key])
+    elif name.key in symbols.types:
+        where = "an IMPORT brings" if name.key in symbols.imported else "is predeclared"
+        names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a constant of the same name")
+    else:
+        symbols.declared[name.key], symbols.types[name.key] = name, kind
+        symbols.constants.add(name.key)
+
+
+def _constant_type(names: NameResolver, node: tree.Constant) -> VariableType | None:
+    """Return what a constant holds; None where something is wrong with its value."""
+    for part in tree.walk(node.value):
+        varies = isinstance(part, tree.ArmName) or (isinstance(part, tree.Function) and part.name.key in WITH_AXIS)
+        if isinstance(part, tree.Name) and names.scope.type(part.key) is not None:
+            varies = not names.scope.is_constant(part.key)
+        if varies or (isinstance(part, tree.Name) and part.key == "TIME" and names.scope.is_value(part.key)):
+            text, note = "the value of a constant is known before the program runs", "it may use numbers, constants"
+            note += " that are declared before it, and functions of them"
+            names.report("E217", text, part.span, "this is not", note=note)
+            return None
+    actual = infer_type(names, node.value)
+    if actual is None:
+        return None
+    kind = VariableKind.TRANS if actual is ExpressionType.MATRIX else KIND_OF_TYPE.get(actual)
+    return None if kind is None else VariableType(kind)
 
 
 # ---- units ---------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from armwright.program.syntax import tree
 def print_(context: Context, node: tree.Print) -> None:
     """Check what is printed: anything but an EVENT."""
     for item in node.items:
-        if not isinstance(item, tree.String) and infer_type(context.names, item) is ExpressionType.EVENT:
+        if infer_type(context.names, item) is ExpressionType.EVENT:
             context.names.report_event(item, "printed")
 
 

@@ -53,6 +53,7 @@ class Symbols(SymbolTable):
     Attributes:
         procedures: by name.
         units: what bare numbers count.
+        constants: the names of CONST parts.
         imported: the frames that IMPORT has brought.
         open_import: whether some IMPORT was not looked up, so that any name may be that of a frame in it.
         std: the language.
@@ -60,6 +61,7 @@ class Symbols(SymbolTable):
 
     procedures: dict[str, ProcedureSymbols] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
+    constants: set[str] = attrs.field(factory=set)
     imported: set[str] = attrs.field(factory=set)
     open_import: bool = False
     std: Standard = Standard.RLO_2
@@ -101,6 +103,10 @@ class Scope:
     def type(self, key: str) -> VariableType | None:
         """Return the type of a name; None where it is unknown or was reported as wrong."""
         return self.table(key).types.get(key)
+
+    def is_constant(self, key: str) -> bool:
+        """Whether a name is that of a constant."""
+        return key in self.symbols.constants and not self.is_local(key)
 
     def is_value(self, key: str) -> bool:
         """Whether a name stands for a value of the language, because nothing else is called so."""

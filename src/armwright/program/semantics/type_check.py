@@ -51,6 +51,15 @@ def report_world_assignment(names: NameResolver, node: tree.Expression) -> None:
     names.report("E218", f"{quote_expression(node)} cannot be assigned a value", node.span, "the root of all frames")
 
 
+def report_constant_assignment(names: NameResolver, node: tree.Name) -> None:
+    """Report that a constant keeps its value."""
+    names.scope.table(node.key).used.add(node.key)
+    text, label = f"`{node.text}` is a constant and keeps its value", "a constant"
+    advice = f"declare it with VAR instead of CONST, and write `{node.text} = ...` after BEGIN"
+    here = names.declaration_labels(node.key)
+    names.report_once("E218", text, node.span, label, [node.key], secondary=here, advice=advice)
+
+
 def require_type(
     names: NameResolver,
     node: tree.Expression,
@@ -117,7 +126,7 @@ def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
 
 def _name(names: NameResolver, node: tree.Name) -> ExpressionType | None:
     if names.scope.is_value(node.key):
-        return ExpressionType.SCALAR
+        return ExpressionType.CONDITION if node.key in ("TRUE", "FALSE") else ExpressionType.SCALAR
     kind = names.type(node)
     return None if kind is None else array_elements.variable_type(names, node, kind)
 
@@ -202,6 +211,7 @@ def _matrix(names: NameResolver, node: tree.Matrix) -> ExpressionType | None:
 
 _TYPE_RULES: dict[type, Callable[..., ExpressionType | None]] = {
     tree.Number: _number,
+    tree.String: lambda _names, _node: ExpressionType.TEXT,
     tree.ArmName: lambda _names, _node: ExpressionType.FRAME,
     tree.Name: _name,
     tree.Index: _index,

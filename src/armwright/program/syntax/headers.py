@@ -6,9 +6,12 @@ from functools import partial
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
+from armwright.program.language.words import HEADERS_IN_CONTEXT
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
 from armwright.program.syntax.declarations import declarations, names_and_type, skip_declaration, var_part
+from armwright.program.syntax.expressions import expression
+from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import TokenStream, describe_token
 
@@ -22,9 +25,11 @@ def parse_headers(tokens: TokenStream) -> list[tree.Header]:
     headers_: list[tree.Header] = []
     while True:
         _skip_semicolons(tokens)
-        tokens.note_expected_words(*tokens.vocabulary.headers, "BEGIN", starts_statement=True)
+        words = (*tokens.vocabulary.headers, *HEADERS_IN_CONTEXT, "BEGIN")
+        tokens.note_expected_words(*words, starts_statement=True)
         token, after = tokens.current, tokens.peek()
-        if token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers:
+        is_header = token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers
+        if is_header or tokens.starts_header_in_context:
             headers_ += parse_header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             text = "missing `VAR` before the declarations"
@@ -96,6 +101,23 @@ def _accept_begin(tokens: TokenStream) -> None:
         return
     text = "missing `BEGIN` before the first statement"
     tokens.report_once("E115", text, tokens.current.gap, "expected `BEGIN` here", replacement="BEGIN ")
+
+
+# constants = "CONST" name "=" expr ";" { name "=" expr ";" } ;
+def _constants(tokens: TokenStream) -> list[tree.Header]:
+    tokens.accept_word("CONST")
+    constants: list[tree.Header] = []
+    while not constants or (tokens.current.kind is TokenKind.NAME and tokens.peek().key in ("=", ":=", "==")):
+        start = tokens.current
+        name = tokens.take_name()
+        tokens.check_name_length(name)
+        tokens.declared.add(name.key)
+        expect_equals(tokens, f"the constant `{name.text}`", name.text)
+        tokens.assignment_target = ""
+        value = expression(tokens, "a value", f"after `{name.text} =`")
+        constants.append(tokens.node(tree.Constant, start, name, value))
+        tokens.accept_semicolon("after the constant")
+    return constants
 
 
 # import = "IMPORT" string ";" ;
@@ -275,6 +297,7 @@ def late_header(tokens: TokenStream) -> tree.Statement:
 
 _HEADERS: Mapping[str, Callable[[TokenStream], Sequence[tree.Header]]] = {
     "VAR": var_part,
+    "CONST": _constants,
     "IMPORT": _import,
     "UNITS": _units,
     "PROCEDURE": _procedure,

@@ -12,6 +12,7 @@ from armwright.program.language.words import (
     FOREIGN_STATEMENTS,
     STATEMENT_PHRASES,
     UNSUPPORTED_STATEMENTS,
+    Standard,
 )
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -147,7 +148,7 @@ def _statement_from_name(tokens: TokenStream, after: Token) -> tree.Statement:
         return tokens.rules[token.key](tokens)
     if after.key in ASSIGNMENT_SIGNS or after.key == "[":
         return tokens.rules["="](tokens)
-    if after.key == "(" and tokens.peek(2).kind is not TokenKind.STRING:
+    if after.key == "(" and (tokens.peek(2).kind is not TokenKind.STRING or tokens.standard is Standard.RLO_2):
         return tokens.rules["("](tokens)
     known = _is_known(tokens, token)
     foreign = not known and (token.key in FOREIGN_STATEMENTS or token.key in UNSUPPORTED_STATEMENTS)

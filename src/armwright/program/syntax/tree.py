@@ -333,7 +333,7 @@ ControlStatement: TypeAlias = (
 class Print(Node):
     """``PRINT (values and strings)``."""
 
-    items: tuple[Expression | String, ...]
+    items: tuple[Expression, ...]
 
 
 Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | Print | Poison
@@ -346,7 +346,7 @@ class TypeName(Node):
     Attributes:
         span: where it stands.
         text: as written.
-        key: SCALAR, TRANS, FRAME or EVENT; None when it is none of them.
+        key: such as SCALAR; None when it is none of the types.
         sizes: of an array, one for each index; empty for a single thing.
     """
 
@@ -361,6 +361,14 @@ class Declaration(Node):
 
     names: tuple[Name, ...]
     type: TypeName
+
+
+@attrs.frozen
+class Constant(Node):
+    """``name = value`` behind CONST."""
+
+    name: Name
+    value: Expression
 
 
 @attrs.frozen
@@ -388,7 +396,7 @@ class Procedure(Node):
     body: Block
 
 
-Header: TypeAlias = Declaration | Import | Units | Procedure
+Header: TypeAlias = Declaration | Constant | Import | Units | Procedure
 
 
 @attrs.frozen
@@ -397,7 +405,7 @@ class Program(Node):
 
     Attributes:
         span: from the first token to the last.
-        headers: declarations, imports, units and procedures, in the order of the text.
+        headers: declarations, constants, imports, units and procedures, in the order of the text.
         statements: in order.
         end: the closing END.
     """
@@ -410,6 +418,11 @@ class Program(Node):
     def declarations(self) -> tuple[Declaration, ...]:
         """The declarations of the VAR parts."""
         return tuple(header for header in self.headers if isinstance(header, Declaration))
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """The constants."""
+        return tuple(header for header in self.headers if isinstance(header, Constant))
 
     @property
     def procedures(self) -> tuple[Procedure, ...]:

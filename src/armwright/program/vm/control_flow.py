@@ -6,12 +6,20 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from armwright.program.bytecode.instructions import Instruction, Op
-from armwright.program.language.kinds import VariableKind
+from armwright.program.language.kinds import BY_VALUE, VariableKind
 from armwright.program.language.source import Span
 from armwright.program.vm.contact import contact_report, record_contact, stop_arm
 from armwright.program.vm.machine import Handler, Machine, RunError, jump_target
 from armwright.program.vm.move import halt_motion, release_locks
-from armwright.program.vm.process import Activation, EarlyEnd, PendingEffect, Process, TryBlock, WaitReason
+from armwright.program.vm.process import (
+    Activation,
+    EarlyEnd,
+    ElementReference,
+    PendingEffect,
+    Process,
+    TryBlock,
+    WaitReason,
+)
 from armwright.program.vm.synchronization import abandon_wait, lock, signal, unlock, wait
 
 # A last pass that rounding would leave out is made.
@@ -57,14 +65,15 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
         slot = f"{key}'{machine.state.activation_count}"
         if key in procedure.parameters:
             operand = step.operands[1 + procedure.parameters.index(key)]
-            by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
+            by_value = not kind.sizes and kind.kind in BY_VALUE
             argument = None if by_value else machine.variable_name(process, operand)
             if argument is not None:
                 bindings[key] = argument
                 continue
             if by_value:
-                read = machine.read_number if kind.kind is VariableKind.SCALAR else machine.read_pose
-                machine.state.values[slot] = read(process, operand, step.span)
+                value = machine.read(process, operand, step.span)
+                assert not isinstance(value, ElementReference)  # noqa: S101 - elements have been read
+                machine.state.values[slot] = value
             else:
                 X_WF = machine.read_pose(process, operand, step.span)
                 machine.replace_tree(machine.state.tree.set_pose(slot, X_WF), slot, step.span)

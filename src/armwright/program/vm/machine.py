@@ -16,7 +16,7 @@ from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
+from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand, Text
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
@@ -169,6 +169,8 @@ class Machine:
             RunError: a variable has no value yet.
         """
         if not isinstance(operand, str):
+            if isinstance(operand, Text):
+                return operand.value
             assert isinstance(operand, float | int)  # noqa: S101 - nothing else has a value
             return float(operand)
         name = self.variable_name(process, operand)

@@ -40,8 +40,8 @@ class ElementReference:
     name: str
 
 
-# Numbers, truth values, poses and steps (4, 4), elements.
-Value: TypeAlias = float | bool | Array | ElementReference
+# Numbers, truth values, texts, poses and steps (4, 4), elements.
+Value: TypeAlias = float | bool | str | Array | ElementReference
 
 
 @attrs.frozen
