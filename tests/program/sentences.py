@@ -12,6 +12,10 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "BOOLEAN": ("BOOLEAN", "boolean"),
     "TEXT": ("TEXT", "text"),
     "CONST": ("CONST", "const"),
+    "FUNCTION": ("FUNCTION", "function"),
+    "MODE": ("IN", "INOUT", "inout"),
+    "LOG": ("LOG", "log"),
+    "RETURN": ("RETURN", "return"),
 }
 
 # A sentence that has come as deep as this takes the shortest way to its end.

@@ -3,6 +3,7 @@
 import random
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from lark import Lark, Token
@@ -43,6 +44,9 @@ WORDS = {
         "const",
         "text",
         "boolean",
+        "return",
+        "inout",
+        "log",
     ),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),
@@ -105,11 +109,17 @@ def left_to_the_checker(node: object) -> bool:
             wrong = any(isinstance(target, tree.ArmName) for target in targets)
         case tree.Operate(device=device):
             wrong = not isinstance(device, tree.Name)
+        case tree.Procedure(result=result) if result is not None:
+            wrong = any(not isinstance(part, tree.FUNCTION_STATEMENTS) for part in statements_of(node.body))
         case tree.Units(units=units):
             wrong = any(unit.key not in DECLARABLE for unit in units)
         case _:
             wrong = False
     return wrong
+
+
+def statements_of(body: tree.Block) -> list[tree.Node]:
+    return [node for node in tree.walk(body) if isinstance(node, get_args(tree.Statement))]
 
 
 def agree(text: str) -> bool:

@@ -39,8 +39,10 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
         start, out.scope = out.here.index, symbols.scope(procedure.name.key)
         context.generate(*procedure.body.statements)
         out.begin()
-        out.emit(Op.RET, span=procedure.body.end)
-        procedures[procedure.name.key] = ProcedureCode(start=start, parameters=own.parameters, types=_known(own.types))
+        out.emit(Op.RET if own.result is None else Op.NORET, span=procedure.body.end)
+        procedures[procedure.name.key] = ProcedureCode(
+            start=start, parameters=own.parameters, types=_known(own.types), inout=own.inout, result=own.result
+        )
     return Code(
         instructions=tuple(out.instructions),
         constants=tuple(out.constants),

@@ -109,6 +109,8 @@ class Emitter:
     def _function(self, node: tree.Function, into: str | None) -> str:
         operands = [self.value(argument) for argument in node.arguments]
         to = into or self.passing()
+        if node.name.key in self.scope.symbols.procedures:
+            return self._operation(Op.CALLF, to, node.name.key, *operands, node=node)
         if node.name.key == "TORQUE":
             # Force and moment are read by one operation.
             return self._operation(Op.FORCE, to, f"M{operands[0]}", node=node)

@@ -17,10 +17,10 @@ class Op(enum.StrEnum):
     """What an instruction does, and what its operands are; docs/code.md explains both.
 
     The operands have a letter each: N a number, P a pose or transformation, T a truth value, W a text, v any value, t
-    any value or characters, x any argument; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a
-    counter; k and K a constant of one and of twelve numbers, j a jump target; a an axis, of a moment with M in front, o
-    ON or OFF, b TRUE or FALSE, r RIGIDLY, w any word. What is in brackets may be left out, + stands for any number more
-    of the last. In front of `=` is what the result is, which goes to the first operand.
+    any value or characters, x any argument, s characters; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any
+    name, C a counter; k and K a constant of one and of twelve numbers, j a jump target; a an axis, of a moment with M
+    in front, o ON or OFF, b TRUE or FALSE, r RIGIDLY, w any word. What is in brackets may be left out, + stands for any
+    number more of the last. In front of `=` is what the result is, which goes to the first operand.
 
     Attributes:
         signature: the letters of its operands.
@@ -116,6 +116,9 @@ class Op(enum.StrEnum):
     JZ = "JZ", "Tj"  # truth value, place: go there when it is false
     FOR = "FOR", "SCNNNj"  # variable, count so far, first, last, step, place: next pass, or go there
     CALL = "CALL", "w(x+)"  # procedure, arguments
+    CALLF = "CALLF", "nw(x+)"  # to, function, arguments: its value
+    RETV = "RETV", "t"  # value of a function, which ends with it
+    NORET = "NORET", ""  # the end of a function, which has not returned a value
     RET = "RET", ""  # end of a procedure, a condition or an action
     FORK = "FORK", "j(N)"  # place[, priority]: a process begins there
     JOIN = "JOIN", ""  # wait for the processes begun here
@@ -132,6 +135,7 @@ class Op(enum.StrEnum):
     HALT = "HALT", ""  # the program ends here
     STOP = "STOP", ""  # end of the text
     PRINT = "PRINT", "t+"  # values and texts
+    LOG = "LOG", "sst+"  # name, titles of the columns as a line of CSV, values and texts
 
 
 @attrs.frozen
@@ -268,11 +272,15 @@ class ProcedureCode:
         start: its first instruction.
         parameters: names, in order.
         types: of parameters and own variables, by name.
+        inout: parameters that are other names of the variables given for them, though of a kind passed by value.
+        result: of a function, what its value is.
     """
 
     start: int
     parameters: tuple[str, ...]
     types: Mapping[str, VariableType]
+    inout: frozenset[str] = frozenset()
+    result: VariableType | None = None
 
 
 @attrs.frozen(kw_only=True)

@@ -6,6 +6,7 @@ LOCK, FORK and MOVE are closed as they were opened. What depends on values or on
 arm that the cell does not have) is left to the run, which has messages for it.
 """
 
+import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
@@ -15,7 +16,7 @@ import numpy as np
 
 from armwright.arrays import LARGEST
 from armwright.errors import counted
-from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, Text
+from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, ProcedureCode, Text
 from armwright.program.bytecode.verifier import (
     OF_KIND,
     Attempt,
@@ -29,6 +30,7 @@ from armwright.program.bytecode.verifier import (
     jump_targets,
 )
 from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import LOG_NAME
 from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
@@ -78,13 +80,16 @@ def _signature(op: Op) -> _Signature:
 
 _SIGNATURES = {op: _signature(op) for op in Op}
 # What works a value out: all that a condition may do, beside jumps and its end.
-_OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.JZ, Op.RET}
+_OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.CALLF, Op.JZ, Op.RET}
+# All that a function may do.
+_OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RETV, Op.NORET}
 # What may follow MVBEG and the parts of a MOVE.
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION),
     Op.QUIT: (Routine.BRANCH,),
+    **dict.fromkeys((Op.RETV, Op.NORET), (Routine.FUNCTION,)),
     Op.MVHLT: (Routine.ACTION,),
     **dict.fromkeys((Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION)),
 }
@@ -112,6 +117,8 @@ def apply_rule(verifier: Verifier, state: State) -> Flow:
     op, operands, signature = verifier.op, verifier.operands, _SIGNATURES[verifier.op]
     if verifier.entry.routine is Routine.CONDITION and op not in _OF_CONDITIONS:
         raise verifier.wrong(f"the code of a condition must not contain {op}")
+    if verifier.entry.routine is Routine.FUNCTION and op not in _OF_FUNCTIONS:
+        raise verifier.wrong(f"the code of a function must not contain {op}")
     for letter, operand in signature.pairs(operands):
         _need(verifier, state, letter, operand)
     if signature.result is not None:
@@ -241,6 +248,16 @@ def _guard(verifier: Verifier, state: State) -> Flow:
     return Flow(state)
 
 
+def _log(verifier: Verifier, state: State) -> Flow:
+    """The name of a log is that of a file, and its rows have as many values as titles."""
+    name, titles, *values = verifier.operands
+    if not isinstance(name, Text) or not LOG_NAME.fullmatch(name.value):
+        raise verifier.wrong(f"LOG expects letters, digits, _ and - for its name, got {name}")
+    if not isinstance(titles, Text) or len(next(csv.reader([titles.value]), [])) != len(values):
+        raise verifier.wrong(f"LOG expects a title for each of its {len(values)} values")
+    return Flow(state)
+
+
 # ---- control flow --------------------------------------------------------------------------------------------------
 
 
@@ -264,6 +281,21 @@ def _unlock(verifier: Verifier, state: State) -> Flow:
 
 def _call(verifier: Verifier, state: State) -> Flow:
     name, *arguments = verifier.operands
+    if _called(verifier, state, name, arguments).result is not None:
+        raise verifier.wrong(f"{name} is a function, which CALLF calls")
+    return Flow(state)
+
+
+def _call_function(verifier: Verifier, state: State) -> Flow:
+    to, name, *arguments = verifier.operands
+    result = _called(verifier, state, name, arguments).result
+    if result is None or result.sizes or result.kind not in OF_KIND:
+        raise verifier.wrong(f"{name} is not a function with a value")
+    return Flow(verifier.write(state, to, OF_KIND[result.kind]))
+
+
+def _called(verifier: Verifier, state: State, name: Operand, arguments: Sequence[Operand]) -> ProcedureCode:
+    """Return what is called, its arguments checked."""
     procedure = verifier.code.procedures.get(str(name))
     if procedure is None:
         raise verifier.wrong(f"there is no procedure {name}")
@@ -272,11 +304,13 @@ def _call(verifier: Verifier, state: State) -> Flow:
         raise verifier.wrong(f"{name} has {takes}, got {counted(len(arguments), 'argument')}")
     for argument, parameter in zip(arguments, procedure.parameters, strict=True):
         kind = procedure.types[parameter]
-        if not kind.sizes and kind.kind in OF_KIND:
+        if parameter in procedure.inout and not kind.sizes:
+            verifier.need_name(state, argument, kind.kind)
+        elif not kind.sizes and kind.kind in OF_KIND:
             verifier.need(state, argument, OF_KIND[kind.kind])
         elif (got := verifier.type_of(state, argument)) != kind:
             raise verifier.wrong(f"parameter {parameter} of {name} expects {kind}, got {got}")
-    return Flow(state)
+    return procedure
 
 
 def _jump_if_not(verifier: Verifier, state: State) -> Flow:
@@ -320,6 +354,8 @@ def _end_routine(verifier: Verifier, state: State) -> Flow:
     entry = verifier.entry
     if entry.routine not in _ENDED_ROUTINES[verifier.op]:
         raise verifier.wrong(f"{verifier.op} cannot end {entry.routine.value}")
+    if verifier.op is Op.RETV and verifier.value(state, verifier.operands[0]) is not entry.result:
+        raise verifier.wrong(f"RETV expects {entry.result.value if entry.result else 'a value'}")
     if entry.routine is Routine.CONDITION:
         verifier.need(state, entry.truth, Value.TRUTH, Value.NUMBER)
     return Flow(state, falls=False)
@@ -331,9 +367,11 @@ _RULES: Mapping[Op, Rule] = {
     **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
+    Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,
     Op.CALL: _call,
+    Op.CALLF: _call_function,
     Op.JMP: lambda verifier, state: Flow(state, (verifier.targets[0], state), falls=False),
     Op.JZ: _jump_if_not,
     Op.FOR: lambda verifier, state: Flow(state, (verifier.targets[0], state)),

@@ -15,6 +15,7 @@ from armwright.program.language.words import (
     BLOCK_CLOSERS,
     SENSORS,
     STATEMENT_PHRASES,
+    STATEMENTS_BEFORE_TEXT,
     VALUES,
     VOCABULARIES,
     WORDS_IN_CONTEXT,
@@ -50,6 +51,7 @@ _SNIPPETS = {
     "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
+    "FUNCTION": (("FUNCTION ...", "FUNCTION ${1:name} (${2:n : SCALAR}) : SCALAR ;\nBEGIN\n  RETURN $0\nEND ;"),),
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
     "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
@@ -61,6 +63,7 @@ _WORD_SNIPPETS = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
     "FORCE": "FORCE ${1:ARM_1}",
+    "LOG": 'LOG "${1:name}" (${2:value})',
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
@@ -181,6 +184,7 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
             items += [*factory.procedures(), *factory.names(_ANY_VALUE.kinds, starts=True)]
     else:
         items = [*factory.arms(operand), *factory.names(operand.kinds), *factory.devices(operand)]
+        items += factory.own_functions(operand)
         items += [*factory.functions(operand), *factory.values(operand), *factory.words(words)]
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
@@ -237,6 +241,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
             yield word
     if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
         yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
+        yield from STATEMENTS_BEFORE_TEXT
 
 
 class _ItemFactory:
@@ -328,9 +333,18 @@ class _ItemFactory:
         for name in filter(self._scope.is_value, operand.values):
             yield self._item(self._match_case(name), Kind.Constant, "", WORDS[name].syntax, WORDS[name].text)
 
+    def own_functions(self, operand: _OperandRule) -> Iterator[CompletionItem]:
+        """Give the functions of the program that have a value of the right kind."""
+        for procedure in self._scope.symbols.procedures.values():
+            if procedure.result is not None and procedure.result.kind in operand.kinds:
+                name = procedure.node.name.text
+                yield self._item(name, Kind.Function, f"{name}($1)", signature(procedure.node)[0])
+
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""
         for procedure in self._scope.symbols.procedures.values():
+            if procedure.is_function:
+                continue
             name = procedure.node.name.text
             text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
             yield self._item(name, Kind.Function, text, signature(procedure.node)[0])

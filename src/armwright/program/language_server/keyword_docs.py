@@ -35,6 +35,16 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "PROCEDURE name (a, b : TYPE, c : TYPE) ; [VAR ...] BEGIN ... END ;",
         "Declares a procedure: SCALAR and TRANS are passed by value; FRAME, EVENT and arrays by reference.",
     ),
+    "FUNCTION": (
+        "FUNCTION name (a, b : TYPE) : TYPE ; [VAR ...] BEGIN ... RETURN value END ;",
+        "Declares a function: it works out a value, and changes no variable but its own.",
+    ),
+    "RETURN": ("RETURN value", "Ends a FUNCTION; the value is that of its call."),
+    "IN": ("PROCEDURE name (IN a : TYPE)", "The parameter is passed as usual for its type."),
+    "INOUT": (
+        "PROCEDURE name (INOUT a : TYPE)",
+        "The parameter is another name of the variable that is given for it, and sets it.",
+    ),
     "BEGIN": ("BEGIN statements END", "Opens the statements of the program, of a procedure, or a block."),
     "END": ("BEGIN statements END", "Closes a BEGIN or TRY; the END of the program is followed by a full stop."),
     "SCALAR": ("name : SCALAR", "A number."),
@@ -103,6 +113,7 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "NOT": ("NOT condition", "Holds when the condition does not."),
     "HALT": ("HALT", "Ends the program; in an action of ON, or a procedure that it calls, that motion alone."),
     "PRINT": ('PRINT ("text", value, ...)', "Prints texts and values on one line."),
+    "LOG": ('LOG "name" (value, ...)', "Writes a row with the time to the file log-NAME.csv of the results."),
     "PAUSE": ("PAUSE seconds", "Waits for this time."),
     # processes
     "COBEGIN": (_COBEGIN, "Runs blocks side by side and waits for all of them; an arm belongs to one of them."),

@@ -134,7 +134,7 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
     key, start, end = token.key, token.start, token.end
     procedures = scope.symbols.procedures
     is_called = next_key == "(" and not scope.is_local(key)
-    if previous == "PROCEDURE" or (is_called and key in procedures):
+    if previous in ("PROCEDURE", "FUNCTION") or (is_called and key in procedures):
         procedure = procedures.get(key)
         declares = procedure is not None and procedure.node.name.span.start == start
         return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)

@@ -197,7 +197,7 @@ def _begins_declaration(tokens: Sequence[Token], index: int) -> bool:
 def _end_of_header(tokens: Sequence[Token], index: int) -> int:
     if tokens[index].key == "VAR":
         return _end_of_variables(tokens, index)
-    if tokens[index].key != "PROCEDURE":
+    if tokens[index].key not in ("PROCEDURE", "FUNCTION"):
         return _index_after(tokens, index, ";")
     index, depth = _index_after(tokens, index, "BEGIN"), 1
     while index < len(tokens) and depth:

@@ -204,7 +204,9 @@ def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSy
     """Take up a procedure and its own names; where its name is taken it cannot be called, but is checked."""
     name = node.name
     parameters = tuple(parameter.key for declaration in node.parameters for parameter in declaration.names)
-    procedure = ProcedureSymbols(node=node, parameters=parameters)
+    inout = frozenset(name.key for part in node.parameters if part.mode == "INOUT" for name in part.names)
+    result = None if node.result is None else _declared_type(names, node.result)
+    procedure = ProcedureSymbols(node=node, parameters=parameters, inout=inout, result=result)
     for declaration in (*node.parameters, *node.declarations):
         _declare_variables(names, procedure, declaration)
     first = names.symbols.procedures.get(name.key)

@@ -29,6 +29,8 @@ class NameResolver:
         self.symbols = Symbols(types=dict(PREDECLARED), std=std)
         self.imports: list[ImportedFrames] = []
         self.cell = cell
+        # Of each log, in lower case, the statement that first writes it.
+        self.logs: dict[str, tree.Log] = {}
         self.scope = Scope(symbols=self.symbols)
         self._called: set[str] = set()
         self._reported: set[tuple[str, int, str]] = set()

@@ -40,10 +40,19 @@ class ProcedureSymbols(SymbolTable):
     Attributes:
         node: the procedure.
         parameters: their names, in order; a name declared twice stands here twice.
+        inout: the parameters that are declared INOUT.
+        result: of a FUNCTION, the type of its value; None for a procedure, and where it was reported as wrong.
     """
 
     node: tree.Procedure
     parameters: tuple[str, ...]
+    inout: frozenset[str] = frozenset()
+    result: VariableType | None = None
+
+    @property
+    def is_function(self) -> bool:
+        """Whether it has a value."""
+        return self.node.result is not None
 
 
 @attrs.define(kw_only=True, eq=False)

@@ -7,7 +7,7 @@ from functools import partial
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import did_you_mean
-from armwright.program.language.words import HEADERS_IN_CONTEXT, TYPES_IN_CONTEXT
+from armwright.program.language.words import HEADERS_IN_CONTEXT, PARAMETER_MODES, TYPES_IN_CONTEXT
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
@@ -105,7 +105,19 @@ def names_and_type(tokens: TokenStream, names: list[tree.Name]) -> tree.TypeName
         tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
         if not (tokens.matches(*tokens.vocabulary.types, "ARRAY") or tokens.matches_word(*TYPES_IN_CONTEXT)):
             raise PanicModeError
-    return _type_name(tokens)
+    return type_name(tokens)
+
+
+def mode_and_names(tokens: TokenStream, names: list[tree.Name]) -> tuple[str, tree.TypeName]:
+    """Read how parameters are passed, where that is written, the parameters, and their type.
+
+    Raises:
+        PanicModeError: there is no type.
+    """
+    mode = None
+    if tokens.matches_word(*PARAMETER_MODES) and tokens.peek().kind is TokenKind.NAME:
+        mode = tokens.accept_word(*PARAMETER_MODES)
+    return "" if mode is None else mode.key, names_and_type(tokens, names)
 
 
 def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
@@ -130,7 +142,8 @@ def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] kind ;
 # kind = "SCALAR" | "TRANS" | "FRAME" | "EVENT" | "BOOLEAN" | "TEXT" ;
-def _type_name(tokens: TokenStream) -> tree.TypeName:
+def type_name(tokens: TokenStream) -> tree.TypeName:
+    """Read a type."""
     start = tokens.current
     tokens.note_expected_words(*tokens.vocabulary.types)
     sizes = _array_sizes(tokens) if tokens.accept("ARRAY") else ()

@@ -149,7 +149,7 @@ def _string(tokens: TokenStream) -> tree.String:
     return tree.String(token.span, token.text[1:-1])
 
 
-# prim = number | string | arm | lvalue | name "(" expr { "," expr } ")" | "(" expr { "," expr } ")" ;
+# prim = number | string | arm | lvalue | name "(" [ expr { "," expr } ] ")" | "(" expr { "," expr } ")" ;
 def _name_or_call(tokens: TokenStream) -> tree.Expression:
     tokens.height = 1
     if tokens.current.kind is _ARM:
@@ -159,10 +159,13 @@ def _name_or_call(tokens: TokenStream) -> tree.Expression:
         return _index(tokens, name)
     if tokens.current.key != "(":
         return name
-    arguments = expression_list(tokens, "a value", f"after {name.text}")
+    is_empty = tokens.standard is Standard.RLO_2 and tokens.peek().key == ")"
+    arguments = expression_list(tokens, "a value", f"after {name.text}", empty=is_empty)
     tokens.height += 1
     start = name.span
-    return tokens.node(tree.Function, start, name, arguments) if arguments else tokens.node(tree.Poison, start)
+    if not arguments and not is_empty:
+        return tokens.node(tree.Poison, start)
+    return tokens.node(tree.Function, start, name, arguments)
 
 
 def _arm(tokens: TokenStream) -> tree.ArmName:

@@ -55,6 +55,7 @@ class TokenStream:
         procedures: the names of the procedures read so far.
         reported_missing: the words whose absence has been reported.
         enclosing_procedure: the key of the procedure that the position lies in; empty outside of all.
+        in_function: whether the position lies in the statements of a FUNCTION.
         recover_depth: how many TRYs the position lies in the second part of.
         assignment_target: the key of the variable that the statement gives a value; empty where it gives none.
         operand_context: what the expression is for that is being read, in the words of messages, and where.
@@ -85,6 +86,7 @@ class TokenStream:
         self.reported_missing: set[str] = set()
         self.enclosing_procedure = self.assignment_target = ""
         self.recover_depth = 0
+        self.in_function = False
         self.operand_context = ANY_VALUE
         self.expected: ExpectedTokens | None = None
         # How much was wrong in front of the last token; what is looked for after a mistake there is guessed.

@@ -317,6 +317,13 @@ class Halt(Node):
 
 
 @attrs.frozen
+class Return(Node):
+    """``RETURN value``."""
+
+    value: Expression
+
+
+@attrs.frozen
 class Call(Node):
     """``name (arguments)``."""
 
@@ -325,7 +332,7 @@ class Call(Node):
 
 
 ControlStatement: TypeAlias = (
-    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Call
+    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Return | Call
 )
 
 
@@ -336,7 +343,20 @@ class Print(Node):
     items: tuple[Expression, ...]
 
 
-Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | Print | Poison
+@attrs.frozen
+class Log(Node):
+    """``LOG "name" (values)``."""
+
+    name: String
+    items: tuple[Expression, ...]
+
+
+OutputStatement: TypeAlias = Print | Log
+
+# What a FUNCTION is made of: it works out a value, and does nothing else.
+FUNCTION_STATEMENTS = (Assign, Block, If, While, Repeat, For, Return, Poison)
+
+Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | OutputStatement | Poison
 
 
 @attrs.frozen
@@ -357,10 +377,11 @@ class TypeName(Node):
 
 @attrs.frozen
 class Declaration(Node):
-    """``a, b : TYPE``, in a VAR part or as a parameter."""
+    """``a, b : TYPE``, in a VAR part or as a parameter; ``mode`` is IN or INOUT where the program says which."""
 
     names: tuple[Name, ...]
     type: TypeName
+    mode: str = ""
 
 
 @attrs.frozen
@@ -387,13 +408,17 @@ class Units(Node):
 
 @attrs.frozen
 class Procedure(Node):
-    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis."""
+    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis.
+
+    A FUNCTION has the type of its ``result`` behind the parenthesis.
+    """
 
     head: Span
     name: Name
     parameters: tuple[Declaration, ...]
     declarations: tuple[Declaration, ...]
     body: Block
+    result: TypeName | None = None
 
 
 Header: TypeAlias = Declaration | Constant | Import | Units | Procedure

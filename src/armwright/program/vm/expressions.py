@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand
-from armwright.program.vm.machine import Handler, Machine, jump_target
+from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
 from armwright.program.vm.process import ElementReference, Process
 from armwright.program.vm.value_text import value_text
@@ -97,14 +97,3 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.TEXT: _text,
     Op.LOADB: _truth,
 }
-
-
-def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[Instruction], index: int = 0) -> None:
-    """Do instructions that only give values, up to RET or the last: those of a condition or an expression."""
-    while index < len(steps) and (step := steps[index]).op is not Op.RET:
-        index += 1
-        if step.op is Op.JZ:
-            # AND and OR jump forwards; nothing else in an expression jumps.
-            index = index if machine.read(process, step.operands[0], step.span) else jump_target(step, 1)
-        else:
-            HANDLERS[step.op](machine, process, step)

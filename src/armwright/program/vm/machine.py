@@ -370,6 +370,18 @@ class Machine:
             )
         )
 
+    def count_step(self, process: Process, span: Span) -> None:
+        """Count an instruction.
+
+        Raises:
+            RunError: there have been too many without any time going by.
+        """
+        self.state.idle_steps += 1
+        if self.state.idle_steps > self.limits.steps:
+            text = f"the program has executed {self.limits.steps} steps, and no time has passed"
+            help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
+            raise self.error(process, "E504", text, span, "it is running this statement", helps=[help_])
+
     # ---- errors ----------------------------------------------------------------------------------------------------
 
     def error(
