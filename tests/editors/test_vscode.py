@@ -92,7 +92,7 @@ def rules(node: Any) -> Iterator[Mapping[str, Any]]:
 def words_of(scope: str) -> list[str]:
     """Return the words of the rule that gives a scope to words alone."""
     patterns = (rule["match"] for rule in rules(GRAMMAR) if rule.get("name") == scope and "match" in rule)
-    (words,) = (found[1] for pattern in patterns if (found := re.match(r"\(\?i\)\(\?:([A-Z|]+)\)\(\?[=!]", pattern)))
+    (words,) = (found[1] for pattern in patterns if (found := re.match(r"\(\?i\)\(\?:([A-Z0-9|]+)\)\(\?[=!]", pattern)))
     return words.split("|")
 
 

@@ -7,6 +7,17 @@ from collections.abc import Callable, Iterator, Mapping
 from lark import Lark
 from lark.grammar import NonTerminal, Rule, Symbol, Terminal
 
+# What the words of the second edition read, which no grammar has as plain words: they may be names.
+IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
+    "BOOLEAN": ("BOOLEAN", "boolean"),
+    "TEXT": ("TEXT", "text"),
+    "CONST": ("CONST", "const"),
+    "FUNCTION": ("FUNCTION", "function"),
+    "MODE": ("IN", "INOUT", "inout"),
+    "LOG": ("LOG", "log"),
+    "RETURN": ("RETURN", "return"),
+}
+
 # A sentence that has come as deep as this takes the shortest way to its end.
 DEEP = 11
 

@@ -3,6 +3,7 @@
 import random
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from lark import Lark, Token
@@ -16,7 +17,7 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
-from program.sentences import Sentences, mutants
+from program.sentences import IN_CONTEXT, Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
 from samples import Sample
 
@@ -26,12 +27,33 @@ NO_NAME = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
 SHALLOW = [path for path in (*ACCEPTED, *REJECTED) if path.parent.name != "depth"]
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *SHALLOW]
 WORDS = {
-    "NAME": ("f", "part", "slot", "n", "t", "hit", "visions", "mm", "x", "stop", "zero", "force", "torque"),
+    "NAME": (
+        "f",
+        "part",
+        "slot",
+        "n",
+        "t",
+        "hit",
+        "visions",
+        "mm",
+        "x",
+        "stop",
+        "zero",
+        "force",
+        "torque",
+        "const",
+        "text",
+        "boolean",
+        "return",
+        "inout",
+        "log",
+    ),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),
     "ARM": ("ARM_1", "arm-2"),
     "VISIONS": ("VISIONS", "visions"),
     "ZERO": ("ZERO", "zero"),
+    **IN_CONTEXT,
     "UNITNAME": DECLARABLE,
     "RELOP": ("<", "<=", "<>", ">=", ">"),
     "ADDOP": ("+", "-"),
@@ -87,11 +109,17 @@ def left_to_the_checker(node: object) -> bool:
             wrong = any(isinstance(target, tree.ArmName) for target in targets)
         case tree.Operate(device=device):
             wrong = not isinstance(device, tree.Name)
+        case tree.Procedure(result=result) if result is not None:
+            wrong = any(not isinstance(part, tree.FUNCTION_STATEMENTS) for part in statements_of(node.body))
         case tree.Units(units=units):
             wrong = any(unit.key not in DECLARABLE for unit in units)
         case _:
             wrong = False
     return wrong
+
+
+def statements_of(body: tree.Block) -> list[tree.Node]:
+    return [node for node in tree.walk(body) if isinstance(node, get_args(tree.Statement))]
 
 
 def agree(text: str) -> bool:

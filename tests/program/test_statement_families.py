@@ -21,13 +21,13 @@ NODES = {
     "devices": set(get_args(tree.DeviceStatement)),
     "move": {tree.Move},
     "control_flow": set(get_args(tree.ControlStatement)),
-    "output": {tree.Print},
+    "output": set(get_args(tree.OutputStatement)),
 }
 OPERATIONS = {
     "frames": {"AFFIX", "AFFAT", "UNFIX"},
     "devices": {"OPEN", "GRASP", "OPER", "READV", "READS", "ZEROF"},
     "move": {op.value for op in Op if op.value.startswith("MV")},
-    "output": {"PRINT"},
+    "output": {"PRINT", "LOG"},
 }
 
 

@@ -19,7 +19,14 @@ from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
-from armwright.program.vm.recording import Effect, Recording, RunStage, measured_csv_lines, motion_csv_lines
+from armwright.program.vm.recording import (
+    Effect,
+    Recording,
+    RunStage,
+    log_csv_lines,
+    measured_csv_lines,
+    motion_csv_lines,
+)
 from armwright.report.collision_text import clearance_data, collision_text
 from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
@@ -86,6 +93,7 @@ def run_files(recording: Recording, diagnostics: Sequence[Diagnostic], origin: R
     return {
         "motion.csv": motion_csv_lines(recording.streams, _written_ticks(recording, origin.motion_rows)),
         **_measured_file(recording, origin.motion_rows),
+        **{f"log-{name}.csv": lines for name, lines in log_csv_lines(recording.effects).items()},
         "events.jsonl": _event_lines(recording),
         "frames.json": _json(frame_data(recording)),
         "report.html": run_page(

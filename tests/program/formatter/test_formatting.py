@@ -19,7 +19,7 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 from armwright.program.syntax.parser import parse
-from program.sentences import Sentences, mutants
+from program.sentences import IN_CONTEXT, Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, OLD, REJECTED
 from samples import Sample
 
@@ -33,6 +33,7 @@ WORDS = {
     "ZERO": ("zero",),
     "FORCE": ("Force",),
     "UNITNAME": ("mm", "DEG"),
+    **IN_CONTEXT,
     "RELOP": ("<", "<=", "<>", ">=", ">"),
     "ADDOP": ("+", "-"),
     "MULOP": ("*", "/"),

@@ -13,7 +13,7 @@ from armwright.program.api import analyse_flow
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import TextEdit, apply_edits
-from armwright.program.language.words import VOCABULARIES, Standard
+from armwright.program.language.words import VALUES, VOCABULARIES, WORDS_IN_CONTEXT, Standard
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.code_actions import all_fixes, quick_fixes
@@ -50,12 +50,13 @@ def labels(text: str, **how: Standard) -> list[str]:
 
 def test_every_word_is_explained() -> None:
     """Each word of the language and each function has a sentence, in the statements where it stands."""
-    for word in (*VOCABULARIES[Standard.RLO_2].reserved, *FUNCTIONS):
+    for word in (*VOCABULARIES[Standard.RLO_2].reserved, *FUNCTIONS, *VALUES, *WORDS_IN_CONTEXT):
         meaning = word_doc(word)
         assert meaning is not None, word
         assert word in meaning.syntax
         assert meaning.text.endswith(".")
-    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | {"VISIONS", "SYSTEM", "ZERO FORCE"}
+    in_context = {"VISIONS", "SYSTEM", "ZERO FORCE", *WORDS_IN_CONTEXT}
+    assert set(WORDS) <= VOCABULARIES[Standard.RLO_2].reserved | set(FUNCTIONS) | VALUES | in_context
 
 
 @pytest.mark.parametrize(
@@ -148,7 +149,7 @@ HEAD = (
         ("WAIT |", ["e"]),
         ("IF n > 1 |", ["AND", "OR", "THEN"]),
         ("IF n > 1 THEN OPEN ARM_1 |", ["TO", "ELSE"]),
-        ("WHILE |", ["n", "DIST", "FORCE", "TORQUE", "NOT"]),
+        ("WHILE |", ["n", "DIST", "FORCE", "TORQUE"]),
         ("FOR n = 1 TO 3 |", ["STEP", "DO"]),
         ("put (|", ["ARM_1", "f", "g", "parts"]),
         ("put (f, |", ["n", "DIST", "FORCE", "TORQUE"]),
@@ -208,7 +209,7 @@ def test_completion_of_what_is_not_looked_at_yet(known: str, since: str, first: 
 
 def test_completion_in_front_of_begin() -> None:
     """In front of BEGIN stand declarations, behind a colon types; none of it is of RLO-2 in RLO-83."""
-    assert labels("VAR f : |") == ["SCALAR", "TRANS", "FRAME", "EVENT", "ARRAY"]
+    assert labels("VAR f : |") == ["SCALAR", "TRANS", "FRAME", "EVENT", "BOOLEAN", "TEXT", "ARRAY"]
     assert labels("VAR f : |", std=Standard.RLO_83) == ["SCALAR", "TRANS", "FRAME"]
     assert labels("|", std=Standard.RLO_83)[0] == "VAR"
     assert "IMPORT" not in labels("|", std=Standard.RLO_83)

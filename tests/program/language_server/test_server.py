@@ -397,7 +397,7 @@ async def test_completion_in_a_move(editor: Editor) -> None:
     assert "WITH BLEND" not in clauses
     assert await offered("MOVE ARM_1 TO cup DIRECTLY, ") == ["ON", "WITH SPEED", "WITH DURATION"]
     assert await offered("MOVE ARM_1 TO cup VIA (above), WITH SPEED = 5, WITH ") == ["APPROACH", "DEPARTURE", "BLEND"]
-    assert await offered("MOVE ARM_1 TO cup WITH SPEED = ") == ["n", "DIST", "FORCE", "TORQUE"]
+    assert (await offered("MOVE ARM_1 TO cup WITH SPEED = "))[:4] == ["n", "DIST", "FORCE", "TORQUE"]
     assert await offered("OPERATE ") == ["LAMP"]
     assert {"MOVE", "put", "n", "MOVE ... WITH APPROACH", "TRY ... RECOVER"} <= set(await offered("M"))
     assert await offered("{ MOVE ") == []

@@ -36,7 +36,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:-[0-9]+)?")
 _PASSING = re.compile(r"%[0-9]+")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _OPERAND_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|;.*|[^\s;]+')
-_ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z]+)(?P<rest>.*)")
+_ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z][A-Za-z0-9]*)(?P<rest>.*)")
 _SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
 _TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
 # What a file may ask for at most.
@@ -61,9 +61,11 @@ def _lines(code: Code) -> Iterator[str]:
     for name, kind in code.types.items():
         yield f"var {name} {kind}"
     for name, procedure in code.procedures.items():
-        yield f"procedure {name} {JumpTarget(procedure.start)}"
+        result = "" if procedure.result is None else f" {procedure.result}"
+        yield f"procedure {name} {JumpTarget(procedure.start)}{result}"
         for own, kind in procedure.types.items():
             word = "parameter" if own in procedure.parameters else "local"
+            word = "inout" if own in procedure.inout else word
             yield f"  {word} {own} {kind}"
     for index, value in enumerate(code.constants):
         numbers = value if isinstance(value, tuple) else (value,)
@@ -124,6 +126,7 @@ class _Reader:
             "var": lambda rest: self._types.update([self._declaration(rest)]),
             "procedure": self._read_procedure,
             "parameter": self._read_parameter,
+            "inout": self._read_inout,
             "local": lambda rest: self._own_types.update([self._declaration(rest)]),
             "constant": self._read_constant,
         }
@@ -138,7 +141,7 @@ class _Reader:
                 self._read_step(line)
             elif word == "code" and not rest:
                 in_code = True
-            elif word in ("parameter", "local") and not self._procedures:
+            elif word in ("parameter", "inout", "local") and not self._procedures:
                 self._fail(f"expected a procedure before the {word}")
             elif word in words:
                 words[word](rest.strip())
@@ -184,17 +187,25 @@ class _Reader:
         self._standard = Standard(rest)
 
     def _read_procedure(self, rest: str) -> None:
-        name, _, start = rest.partition(" ")
+        name, _, rest = rest.partition(" ")
+        start, _, result = rest.partition(" ")
         if not re.fullmatch(r"@[0-9]{1,9}", start):
             self._fail("expected the first instruction of the procedure, such as @0012")
         self._own_types = {}
-        self._procedures[self._name(name)] = ProcedureCode(start=int(start[1:]), parameters=(), types=self._own_types)
+        self._procedures[self._name(name)] = ProcedureCode(
+            start=int(start[1:]), parameters=(), types=self._own_types, result=self._type(result) if result else None
+        )
 
     def _read_parameter(self, rest: str) -> None:
         parameter, kind = self._declaration(rest)
         self._own_types[parameter] = kind
         name, last = self._procedures.popitem()
         self._procedures[name] = attrs.evolve(last, parameters=(*last.parameters, parameter))
+
+    def _read_inout(self, rest: str) -> None:
+        self._read_parameter(rest)
+        name, last = self._procedures.popitem()
+        self._procedures[name] = attrs.evolve(last, inout=last.inout | {last.parameters[-1]})
 
     def _read_constant(self, rest: str) -> None:
         name, *numbers = rest.split() or [""]

@@ -26,19 +26,23 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
         flow: the arms of its statements.
         spelling: how it writes its names.
     """
-    out = Emitter(source, symbols.units)
+    out = Emitter(source, symbols.scope(None))
     context = Context(GENERATORS, out, flow, spelling)
+    for constant in program.constants:
+        frames.assign(context, tree.Assign(constant.span, constant.name, constant.value))
     context.generate(*program.statements)
     out.begin()
     out.emit(Op.STOP, span=program.end)
     procedures = {}
     for procedure in program.procedures:
         own = symbols.procedures[procedure.name.key]
-        start = out.here.index
+        start, out.scope = out.here.index, symbols.scope(procedure.name.key)
         context.generate(*procedure.body.statements)
         out.begin()
-        out.emit(Op.RET, span=procedure.body.end)
-        procedures[procedure.name.key] = ProcedureCode(start=start, parameters=own.parameters, types=_known(own.types))
+        out.emit(Op.RET if own.result is None else Op.NORET, span=procedure.body.end)
+        procedures[procedure.name.key] = ProcedureCode(
+            start=start, parameters=own.parameters, types=_known(own.types), inout=own.inout, result=own.result
+        )
     return Code(
         instructions=tuple(out.instructions),
         constants=tuple(out.constants),

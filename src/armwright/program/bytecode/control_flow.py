@@ -123,5 +123,6 @@ GENERATORS: Generators = {
     tree.Try: try_,
     tree.Retry: one_instruction(Op.RETRY),
     tree.Halt: halt,
+    tree.Return: one_instruction(Op.RETV),
     tree.Call: call,
 }

@@ -1,10 +1,14 @@
 """Writing instructions: places that are known later, values in passing, and the code of expressions."""
 
+import math
+
 import attrs
 
-from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand
+from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand, Text
 from armwright.program.language.source import Source, Span
-from armwright.program.language.units import UnitSystem, convert
+from armwright.program.language.units import convert
+from armwright.program.language.words import VALUES
+from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import pose_literals, tree
 
 # A place that will be known later.
@@ -15,11 +19,15 @@ _OPERATIONS |= {"<": Op.LT, "<=": Op.LE, "=": Op.EQ, "<>": Op.NE, ">=": Op.GE, "
 
 
 class Emitter:
-    """The instructions of a program so far."""
+    """The instructions of a program so far.
 
-    def __init__(self, source: Source, units: UnitSystem) -> None:
+    Attributes:
+        scope: the names that the present statements see.
+    """
+
+    def __init__(self, source: Source, scope: Scope) -> None:
         """Start with nothing."""
-        self.source, self.units = source, units
+        self.source, self.scope, self.units = source, scope, scope.symbols.units
         self.instructions: list[Instruction] = []
         self.constants: list[tuple[float, ...] | float] = []
         self._passing = 0
@@ -69,20 +77,22 @@ class Emitter:
             The operand that has the value: ``into`` if given.
         """
         match node:
-            case tree.Number() | tree.Name() | tree.ArmName():
-                operand = self.literal_value(node) if isinstance(node, tree.Number) else node.key
+            case tree.Name(key=key) if key in VALUES and self.scope.is_value(key):
+                return self._value_of_language(node, into)
+            case tree.Number():
+                operand: Operand = self.literal_value(node)
+            case tree.String(value=characters):
+                operand = Text(characters)
+            case tree.Name(key=key) | tree.ArmName(key=key):
+                operand = key
             case tree.Index(name=name, indices=indices):
                 operand = self._operation(Op.ELEM, self.passing(), name.key, *map(self.value, indices), node=node)
             case tree.Binary():
                 return self._chain(node, into)
             case tree.Matrix():
                 return self._matrix(node, into or self.passing())
-            case tree.Function(name=name, arguments=arguments):
-                operands = [self.value(argument) for argument in arguments]
-                if name.key == "TORQUE":
-                    # Force and moment are read by one operation.
-                    return self._operation(Op.FORCE, into or self.passing(), f"M{operands[0]}", node=node)
-                return self._operation(Op[name.key], into or self.passing(), *operands, node=node)
+            case tree.Function():
+                return self._function(node, into)
             case tree.Unary():
                 value = self.value(node.operand)
                 op = Op.NOT if node.operation == "NOT" else Op.NEG
@@ -96,6 +106,24 @@ class Emitter:
         self.emit(op, to, *operands, span=node.span)
         return to
 
+    def _function(self, node: tree.Function, into: str | None) -> str:
+        operands = [self.value(argument) for argument in node.arguments]
+        to = into or self.passing()
+        if node.name.key in self.scope.symbols.procedures:
+            return self._operation(Op.CALLF, to, node.name.key, *operands, node=node)
+        if node.name.key == "TORQUE":
+            # Force and moment are read by one operation.
+            return self._operation(Op.FORCE, to, f"M{operands[0]}", node=node)
+        return self._operation(Op[node.name.key], to, *operands, node=node)
+
+    def _value_of_language(self, node: tree.Name, into: str | None) -> Operand:
+        if node.key != "PI":
+            to = into or self.passing()
+            if node.key == "TIME":
+                return self._operation(Op.TIME, to, node=node)
+            return self._operation(Op.LOADB, to, node.key, node=node)
+        return math.pi if into is None else self._operation(Op.COPY, into, math.pi, node=node)
+
     def literal_value(self, node: tree.Number) -> float:
         """Return the value of a number literal in the units of the program."""
         return float(convert(node.value, node.unit, self.units))
@@ -103,6 +131,10 @@ class Emitter:
     def _chain(self, node: tree.Binary, into: str | None) -> Operand:
         """Write the operations of a chain, one after the other."""
         first, chain = tree.operation_chain(node)
+        variable = None
+        if into is not None and not into.startswith("%") and any(link.operation in ("AND", "OR") for link in chain):
+            # The variable may be part of the condition: it gets its value when all of that is worked out.
+            variable, into = into, None
         # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
         targets: list[str | None] = []
         for link in reversed(chain):
@@ -117,7 +149,7 @@ class Emitter:
             else:
                 right = self.value(link.right)
                 left = self._operation(_OPERATIONS[link.operation], to or self.passing(), left, right, node=link)
-        return left
+        return left if variable is None else self._operation(Op.COPY, variable, left, node=node)
 
     def _joint(self, node: tree.Binary, to: str) -> str:
         """AND and OR look at the right side only where it matters: ``n > 0 AND a[n] > 2``."""

@@ -16,11 +16,11 @@ from armwright.program.language.words import Standard
 class Op(enum.StrEnum):
     """What an instruction does, and what its operands are; docs/code.md explains both.
 
-    The operands have a letter each: N a number, P a pose or transformation, T a truth value, v any value, t any value
-    or a text; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any name, C a counter; k and K a constant of one
-    and of twelve numbers, j a jump target; a an axis, of a moment with M in front, o ON or OFF, r RIGIDLY, w any word.
-    What is in brackets may be left out, + stands for any number more of the last. In front of `=` is what the result
-    is, which goes to the first operand.
+    The operands have a letter each: N a number, P a pose or transformation, T a truth value, W a text, v any value, t
+    any value or characters, x any argument, s characters; F, S and E the name of a FRAME, a SCALAR or an EVENT, n any
+    name, C a counter; k and K a constant of one and of twelve numbers, j a jump target; a an axis, of a moment with M
+    in front, o ON or OFF, b TRUE or FALSE, r RIGIDLY, w any word. What is in brackets may be left out, + stands for any
+    number more of the last. In front of `=` is what the result is, which goes to the first operand.
 
     Attributes:
         signature: the letters of its operands.
@@ -38,7 +38,8 @@ class Op(enum.StrEnum):
     # values
     LOADM = "LOADM", "P=K"  # to, constant: the twelve numbers
     LOADS = "LOADS", "N=k"  # to, constant: the number
-    COPY = "COPY", "nv"  # to, value
+    LOADB = "LOADB", "T=b"  # to, TRUE or FALSE
+    COPY = "COPY", "nt"  # to, value
     MATX = "MATX", "P=NNNNNNNNNNNN"  # to, twelve values: n, o, a, p
     MUL = "MUL", "nvv"  # to, left, right: numbers, or places and steps
     DIV = "DIV", "N=NN"
@@ -48,8 +49,8 @@ class Op(enum.StrEnum):
     INV = "INV", "P=P"  # to, place or step
     LT = "LT", "T=NN"  # to, left, right: a truth value
     LE = "LE", "T=NN"
-    EQ = "EQ", "T=NN"
-    NE = "NE", "T=NN"
+    EQ = "EQ", "T=tt"  # of texts too
+    NE = "NE", "T=tt"
     GE = "GE", "T=NN"
     GT = "GT", "T=NN"
     NOT = "NOT", "T=T"  # to, truth value
@@ -57,7 +58,33 @@ class Op(enum.StrEnum):
     ROTX = "ROTX", "P=N"  # to, angle: a turn
     ROTY = "ROTY", "P=N"
     ROTZ = "ROTZ", "P=N"
+    TEXT = "TEXT", "W=t+"  # to, values and texts: the text that PRINT would write
     DIST = "DIST", "N=PP"  # to, frame, frame
+    RPY = "RPY", "P=NNN"  # to, roll, pitch, yaw: a turn
+    ROT = "ROT", "P=NNNN"  # to, three components of an axis, angle: a turn
+    X = "X", "N=P"  # to, place or step: a coordinate
+    Y = "Y", "N=P"
+    Z = "Z", "N=P"
+    ROLL = "ROLL", "N=P"  # to, place or step: an angle about a fixed axis, x, then y, then z
+    PITCH = "PITCH", "N=P"
+    YAW = "YAW", "N=P"
+    ANGLE = "ANGLE", "N=P"  # to, place or step: the angle of its turn
+    AXISX = "AXISX", "N=P"  # to, place or step: a component of the axis of its turn
+    AXISY = "AXISY", "N=P"
+    AXISZ = "AXISZ", "N=P"
+    ABS = "ABS", "N=N"  # to, value
+    SQRT = "SQRT", "N=N"
+    ROUND = "ROUND", "N=N"
+    SIN = "SIN", "N=N"  # to, angle
+    COS = "COS", "N=N"
+    TAN = "TAN", "N=N"
+    ASIN = "ASIN", "N=N"  # to, value: an angle
+    ACOS = "ACOS", "N=N"
+    ATAN2 = "ATAN2", "N=NN"  # to, y, x: an angle
+    MOD = "MOD", "N=NN"  # to, dividend, divisor: the remainder
+    MIN = "MIN", "N=NN+"  # to, values: the smallest
+    MAX = "MAX", "N=NN+"
+    TIME = "TIME", "N="  # to: the time on the clock of the cell
     FORCE = "FORCE", "N=a"  # to, axis
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
@@ -88,7 +115,10 @@ class Op(enum.StrEnum):
     JMP = "JMP", "j"  # place
     JZ = "JZ", "Tj"  # truth value, place: go there when it is false
     FOR = "FOR", "SCNNNj"  # variable, count so far, first, last, step, place: next pass, or go there
-    CALL = "CALL", "w(v+)"  # procedure, arguments
+    CALL = "CALL", "w(x+)"  # procedure, arguments
+    CALLF = "CALLF", "nw(x+)"  # to, function, arguments: its value
+    RETV = "RETV", "t"  # value of a function, which ends with it
+    NORET = "NORET", ""  # the end of a function, which has not returned a value
     RET = "RET", ""  # end of a procedure, a condition or an action
     FORK = "FORK", "j(N)"  # place[, priority]: a process begins there
     JOIN = "JOIN", ""  # wait for the processes begun here
@@ -105,6 +135,7 @@ class Op(enum.StrEnum):
     HALT = "HALT", ""  # the program ends here
     STOP = "STOP", ""  # end of the text
     PRINT = "PRINT", "t+"  # values and texts
+    LOG = "LOG", "sst+"  # name, titles of the columns as a line of CSV, values and texts
 
 
 @attrs.frozen
@@ -241,11 +272,15 @@ class ProcedureCode:
         start: its first instruction.
         parameters: names, in order.
         types: of parameters and own variables, by name.
+        inout: parameters that are other names of the variables given for them, though of a kind passed by value.
+        result: of a function, what its value is.
     """
 
     start: int
     parameters: tuple[str, ...]
     types: Mapping[str, VariableType]
+    inout: frozenset[str] = frozenset()
+    result: VariableType | None = None
 
 
 @attrs.frozen(kw_only=True)

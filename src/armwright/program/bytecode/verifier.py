@@ -8,7 +8,7 @@ from typing import TypeAlias
 import attrs
 
 from armwright.errors import ArmwrightError
-from armwright.program.bytecode.instructions import Code, JumpTarget, Op, Operand
+from armwright.program.bytecode.instructions import Code, JumpTarget, Op, Operand, ProcedureCode, Text
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 
@@ -33,6 +33,7 @@ class Value(enum.Enum):
     NUMBER = "a number"
     TRUTH = "a truth value"
     POSE = "a pose or a transformation"
+    TEXT = "a text"
 
 
 @attrs.frozen
@@ -43,7 +44,13 @@ class Element:
 
 
 ValueType: TypeAlias = Value | Element
-OF_KIND = {VariableKind.SCALAR: Value.NUMBER, VariableKind.TRANS: Value.POSE, VariableKind.FRAME: Value.POSE}
+OF_KIND = {
+    VariableKind.SCALAR: Value.NUMBER,
+    VariableKind.TRANS: Value.POSE,
+    VariableKind.FRAME: Value.POSE,
+    VariableKind.BOOLEAN: Value.TRUTH,
+    VariableKind.TEXT: Value.TEXT,
+}
 _FRAME = VariableType(VariableKind.FRAME)
 
 
@@ -52,6 +59,7 @@ class Routine(enum.Enum):
 
     PROGRAM = "the program"
     PROCEDURE = "a procedure"
+    FUNCTION = "a function"
     BRANCH = "a branch"
     CONDITION = "a condition"
     ACTION = "an action"
@@ -91,6 +99,7 @@ class Entry:
         types: its own names; ``None`` for those of the program alone.
         state: in front of the first instruction.
         truth: the value in passing that a condition leaves.
+        result: what the value of a function is.
         begun: the instruction that begins it.
     """
 
@@ -100,6 +109,7 @@ class Entry:
     state: State = State()
     truth: str = ""
     begun: int = -1
+    result: Value | None = None
 
 
 @attrs.frozen
@@ -135,7 +145,7 @@ class Verifier:
         """
         self.code, self._rule = code, rule
         self.at, self.entry = 0, Entry(0, Routine.PROGRAM, {})
-        procedures = [Entry(own.start, Routine.PROCEDURE, own.types) for own in code.procedures.values()]
+        procedures = [_entry(own) for own in code.procedures.values()]
         self._entries = [self.entry, *procedures]
         self._owners: dict[int, Entry] = {}
         self._known: dict[int, State] = {}
@@ -248,7 +258,7 @@ class Verifier:
     def value(self, state: State, operand: Operand) -> Value:
         """Return what the value of an operand is."""
         if not isinstance(operand, str):
-            return Value.NUMBER
+            return Value.TEXT if isinstance(operand, Text) else Value.NUMBER
         if operand.startswith("%") and isinstance(kept := self._passing(state, operand), Value):
             return kept
         kind = self.type_of(state, operand)
@@ -274,6 +284,8 @@ class Verifier:
         if name.startswith("%") and not isinstance(self._types.get(name), Element):
             return self.define(state, name, value)
         kind = self.type_of(state, name)
+        if self.entry.routine is Routine.FUNCTION and name not in self.entry.types and not name.startswith("%"):
+            raise self.wrong(f"a function must not change {name}, which is not its own")
         if kind.sizes or OF_KIND.get(kind.kind) is not value:
             raise self.wrong(f"{name} is {kind}, but the value is {value.value}")
         return state
@@ -283,6 +295,13 @@ class Verifier:
         if self._types.setdefault(name, kind) != kind:
             raise self.wrong(f"{name} would have two different types")
         return attrs.evolve(state, written=state.written | 1 << self._bits.setdefault(name, len(self._bits)))
+
+
+def _entry(own: ProcedureCode) -> Entry:
+    """Return where a procedure or function begins."""
+    if own.result is None:
+        return Entry(own.start, Routine.PROCEDURE, own.types)
+    return Entry(own.start, Routine.FUNCTION, own.types, result=OF_KIND.get(own.result.kind))
 
 
 def jump_targets(code: Code) -> set[int]:

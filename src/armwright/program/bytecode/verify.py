@@ -6,6 +6,7 @@ LOCK, FORK and MOVE are closed as they were opened. What depends on values or on
 arm that the cell does not have) is left to the run, which has messages for it.
 """
 
+import csv
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
@@ -15,7 +16,7 @@ import numpy as np
 
 from armwright.arrays import LARGEST
 from armwright.errors import counted
-from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, Text
+from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, ProcedureCode, Text
 from armwright.program.bytecode.verifier import (
     OF_KIND,
     Attempt,
@@ -29,26 +30,30 @@ from armwright.program.bytecode.verifier import (
     jump_targets,
 )
 from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import LOG_NAME
 from armwright.program.syntax.pose_literals import EXACT_TOLERANCE
 from armwright.spatial.rotations import orthonormality_error
 
 _VALUES = {"N": (Value.NUMBER,), "C": (Value.NUMBER,), "P": (Value.POSE,), "T": (Value.TRUTH, Value.NUMBER)}
+_VALUES["W"] = (Value.TEXT,)
 _NAMES = {"F": VariableKind.FRAME, "S": VariableKind.SCALAR, "E": VariableKind.EVENT}
 # The words that an operand may be, and what is said of others.
 _WORDS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "a": (("X", "Y", "Z", "MX", "MY", "MZ"), "{op} expects the axis X, Y or Z, or MX, MY or MZ, got {word}"),
     "o": (("ON", "OFF"), "{op} expects ON or OFF, got {word}"),
+    "b": (("TRUE", "FALSE"), "{op} expects TRUE or FALSE, got {word}"),
     "r": (("RIGIDLY",), "the last operand of {op} may only be RIGIDLY"),
 }
 # The forms of operands, by the letters of `_letter`.
 _FORMS: Mapping[str, str] = {
     "(": "(?:",
     ")": ")?",
-    "t": "[wqds]",
+    **dict.fromkeys("tx", "[wqds]"),
     "K": "k",
     **dict.fromkeys("nFSEC", "[wq]"),
     **dict.fromkeys("vNPT", "[wqd]"),
-    **dict.fromkeys("aor", "w"),
+    "W": "[wqs]",
+    **dict.fromkeys("aobr", "w"),
 }
 
 
@@ -75,13 +80,16 @@ def _signature(op: Op) -> _Signature:
 
 _SIGNATURES = {op: _signature(op) for op in Op}
 # What works a value out: all that a condition may do, beside jumps and its end.
-_OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.JZ, Op.RET}
+_OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.CALLF, Op.JZ, Op.RET}
+# All that a function may do.
+_OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RETV, Op.NORET}
 # What may follow MVBEG and the parts of a MOVE.
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION),
     Op.QUIT: (Routine.BRANCH,),
+    **dict.fromkeys((Op.RETV, Op.NORET), (Routine.FUNCTION,)),
     Op.MVHLT: (Routine.ACTION,),
     **dict.fromkeys((Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION)),
 }
@@ -109,6 +117,8 @@ def apply_rule(verifier: Verifier, state: State) -> Flow:
     op, operands, signature = verifier.op, verifier.operands, _SIGNATURES[verifier.op]
     if verifier.entry.routine is Routine.CONDITION and op not in _OF_CONDITIONS:
         raise verifier.wrong(f"the code of a condition must not contain {op}")
+    if verifier.entry.routine is Routine.FUNCTION and op not in _OF_FUNCTIONS:
+        raise verifier.wrong(f"the code of a function must not contain {op}")
     for letter, operand in signature.pairs(operands):
         _need(verifier, state, letter, operand)
     if signature.result is not None:
@@ -123,7 +133,7 @@ def _need(verifier: Verifier, state: State, letter: str, operand: Operand) -> No
         verifier.need(state, operand, *_VALUES[letter])
     elif letter in _NAMES:
         verifier.need_name(state, operand, _NAMES[letter])
-    elif letter == "t" and not isinstance(operand, Text):
+    elif letter == "t":
         verifier.value(state, operand)
     elif letter in _WORDS:
         words, fault = _WORDS[letter]
@@ -211,6 +221,14 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     return Flow(verifier.write(state, to, left))
 
 
+def _compare(verifier: Verifier, state: State) -> Flow:
+    """EQ and NE compare numbers, or texts."""
+    left, right = (verifier.value(state, operand) for operand in verifier.operands[1:])
+    if left is not right or left not in (Value.NUMBER, Value.TEXT):
+        raise verifier.wrong(f"{verifier.op} expects two numbers or two texts")
+    return Flow(state)
+
+
 def _element(verifier: Verifier, state: State) -> Flow:
     to, array, *indices = verifier.operands
     kind = verifier.declared(str(array))
@@ -227,6 +245,16 @@ def _guard(verifier: Verifier, state: State) -> Flow:
         raise verifier.wrong(f"MVON expects a temporary such as %1 for the value of its condition, got {truth}")
     verifier.begin(condition, Routine.CONDITION, state, str(truth))
     verifier.begin(action, Routine.ACTION, state)
+    return Flow(state)
+
+
+def _log(verifier: Verifier, state: State) -> Flow:
+    """The name of a log is that of a file, and its rows have as many values as titles."""
+    name, titles, *values = verifier.operands
+    if not isinstance(name, Text) or not LOG_NAME.fullmatch(name.value):
+        raise verifier.wrong(f"LOG expects letters, digits, _ and - for its name, got {name}")
+    if not isinstance(titles, Text) or len(next(csv.reader([titles.value]), [])) != len(values):
+        raise verifier.wrong(f"LOG expects a title for each of its {len(values)} values")
     return Flow(state)
 
 
@@ -253,6 +281,21 @@ def _unlock(verifier: Verifier, state: State) -> Flow:
 
 def _call(verifier: Verifier, state: State) -> Flow:
     name, *arguments = verifier.operands
+    if _called(verifier, state, name, arguments).result is not None:
+        raise verifier.wrong(f"{name} is a function, which CALLF calls")
+    return Flow(state)
+
+
+def _call_function(verifier: Verifier, state: State) -> Flow:
+    to, name, *arguments = verifier.operands
+    result = _called(verifier, state, name, arguments).result
+    if result is None or result.sizes or result.kind not in OF_KIND:
+        raise verifier.wrong(f"{name} is not a function with a value")
+    return Flow(verifier.write(state, to, OF_KIND[result.kind]))
+
+
+def _called(verifier: Verifier, state: State, name: Operand, arguments: Sequence[Operand]) -> ProcedureCode:
+    """Return what is called, its arguments checked."""
     procedure = verifier.code.procedures.get(str(name))
     if procedure is None:
         raise verifier.wrong(f"there is no procedure {name}")
@@ -261,11 +304,13 @@ def _call(verifier: Verifier, state: State) -> Flow:
         raise verifier.wrong(f"{name} has {takes}, got {counted(len(arguments), 'argument')}")
     for argument, parameter in zip(arguments, procedure.parameters, strict=True):
         kind = procedure.types[parameter]
-        if not kind.sizes and kind.kind in OF_KIND:
+        if parameter in procedure.inout and not kind.sizes:
+            verifier.need_name(state, argument, kind.kind)
+        elif not kind.sizes and kind.kind in OF_KIND:
             verifier.need(state, argument, OF_KIND[kind.kind])
         elif (got := verifier.type_of(state, argument)) != kind:
             raise verifier.wrong(f"parameter {parameter} of {name} expects {kind}, got {got}")
-    return Flow(state)
+    return procedure
 
 
 def _jump_if_not(verifier: Verifier, state: State) -> Flow:
@@ -309,6 +354,8 @@ def _end_routine(verifier: Verifier, state: State) -> Flow:
     entry = verifier.entry
     if entry.routine not in _ENDED_ROUTINES[verifier.op]:
         raise verifier.wrong(f"{verifier.op} cannot end {entry.routine.value}")
+    if verifier.op is Op.RETV and verifier.value(state, verifier.operands[0]) is not entry.result:
+        raise verifier.wrong(f"RETV expects {entry.result.value if entry.result else 'a value'}")
     if entry.routine is Routine.CONDITION:
         verifier.need(state, entry.truth, Value.TRUTH, Value.NUMBER)
     return Flow(state, falls=False)
@@ -317,11 +364,14 @@ def _end_routine(verifier: Verifier, state: State) -> Flow:
 _RULES: Mapping[Op, Rule] = {
     Op.COPY: _copy,
     Op.MUL: _multiply,
+    **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
+    Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,
     Op.CALL: _call,
+    Op.CALLF: _call_function,
     Op.JMP: lambda verifier, state: Flow(state, (verifier.targets[0], state), falls=False),
     Op.JZ: _jump_if_not,
     Op.FOR: lambda verifier, state: Flow(state, (verifier.targets[0], state)),

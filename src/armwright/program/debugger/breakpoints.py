@@ -91,7 +91,7 @@ class Watch:
     condition: str = ""
     hit_condition: str = ""
     changes: int = 0
-    last_value: "Array | float | None" = None
+    last_value: "Array | float | str | None" = None
     reported_motion: tuple[ProcessPath, int] | None = None
 
     def check_change(self, view: Machine) -> str | None:
@@ -138,7 +138,7 @@ def _motion_id(view: Machine, slot: str) -> tuple[ProcessPath, int] | None:
     return None if process is None or process.motion is None else (process.path, process.motion.start.tick)
 
 
-def _value(view: Machine, slot: str) -> "Array | float | None":
+def _value(view: Machine, slot: str) -> "Array | float | str | None":
     kind = view.type_of(slot).kind
     if kind is VariableKind.FRAME:
         return view.state.tree.world(slot) if view.has_pose(slot) else None
@@ -147,7 +147,9 @@ def _value(view: Machine, slot: str) -> "Array | float | None":
     return view.state.values.get(slot)
 
 
-def _are_equal(value: "Array | float | None", other: "Array | float | None") -> bool:
+def _are_equal(value: "Array | float | str | None", other: "Array | float | str | None") -> bool:
     if value is None or other is None:
         return value is other
+    if isinstance(value, str) or isinstance(other, str):
+        return bool(value == other)
     return bool(np.allclose(value, other, rtol=0, atol=_MOVE_TOLERANCE if isinstance(value, np.ndarray) else 0))

@@ -7,20 +7,20 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Operand
+from armwright.program.bytecode.instructions import Op, Operand
 from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
-from armwright.program.language.source import Source
+from armwright.program.language.source import Source, Span
 from armwright.program.semantics import type_check
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, TYPE_OF_KIND, ExpressionType, type_texts
 from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Scope
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.token_stream import PanicModeError, TokenStream
-from armwright.program.vm.expressions import evaluate_instructions
+from armwright.program.vm.calls import evaluate_instructions
 from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.process import Activation, Process, Value
 
@@ -37,11 +37,13 @@ class CheckedExpression:
         source: its text.
         node: what it says.
         type: what its value is; None for a whole array.
+        scope: the names it was checked with.
     """
 
     source: Source
     node: tree.Expression
     type: ExpressionType | None
+    scope: Scope
 
 
 def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
@@ -75,16 +77,42 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
     _raise_errors(tokens.diagnostics)
     if node is None or not tokens.is_at_end:
         raise ExpressionError(f"`{tokens.current.text}` does not belong here")
-    if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
-        return CheckedExpression(source=source, node=node, type=None)
     names = NameResolver(None)
     names.symbols.types = dict(types)
     names.symbols.units = machine.code.units
+    names.symbols.procedures = _procedures(machine)
+    if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
+        return CheckedExpression(source=source, node=node, type=None, scope=names.scope)
     sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
-    return CheckedExpression(source=source, node=node, type=sort)
+    return CheckedExpression(source=source, node=node, type=sort, scope=names.scope)
+
+
+def _procedures(machine: Machine) -> dict[str, ProcedureSymbols]:
+    """Return the procedures and functions of a program, as far as its code knows them."""
+    nowhere = Span(0, 0)
+    body, none = tree.Block(nowhere, (), nowhere), tree.TypeName(nowhere, "", None)
+    return {
+        key: ProcedureSymbols(
+            node=tree.Procedure(
+                nowhere,
+                nowhere,
+                tree.Name(nowhere, machine.spelling(key), key),
+                (),
+                (),
+                body,
+                None if code.result is None else none,
+            ),
+            parameters=code.parameters,
+            types=dict(code.types),
+            declared={name: tree.Name(nowhere, machine.spelling(name), name) for name in code.types},
+            inout=code.inout,
+            result=code.result,
+        )
+        for key, code in machine.code.procedures.items()
+    }
 
 
 def evaluate(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> Value:
@@ -159,14 +187,19 @@ def _execute(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> 
     Raises:
         ExpressionError: something in it has no value.
     """
-    emitter = Emitter(parsed.source, machine.code.units)
+    emitter = Emitter(parsed.source, parsed.scope)
+    # Functions of the program are called where they stand.
+    emitter.instructions, emitter.constants = list(machine.code.instructions), list(machine.code.constants)
+    start = len(emitter.instructions)
     operand = emitter.value(parsed.node)
     steps, constants = tuple(emitter.instructions), tuple(emitter.constants)
     code = attrs.evolve(machine.code, instructions=steps, constants=constants, source=parsed.source)
     evaluator, process = machine.with_code(code), copy.copy(frame.process)
+    if any(step.op is Op.CALLF for step in steps[start:]):
+        evaluator.state = machine.state.copy()
     process.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
     try:
-        evaluate_instructions(evaluator, process, steps)
+        evaluate_instructions(evaluator, process, steps, start)
     except RunError as error:
         raise ExpressionError(str(error)) from None
     return evaluator, process, operand

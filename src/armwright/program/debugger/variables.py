@@ -97,6 +97,8 @@ def value_variable(machine: Machine, name: str, value: Value, kind: str) -> Vari
     if isinstance(value, np.ndarray):
         text = _pose_text(machine, value)
         return Variable(name=name, value=text, type=kind, children=lambda: _pose_columns(machine, value))
+    if isinstance(value, str):
+        return Variable(name=name, value=f'"{value}"', type=kind)
     return Variable(name=name, value=str(value).lower() if isinstance(value, bool) else f"{value:.12g}", type=kind)
 
 

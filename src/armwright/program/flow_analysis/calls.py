@@ -5,14 +5,14 @@ from armwright.program.flow_analysis.context import MAX_DEPTH, Context
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.lattice import EVERYTHING, Uncertainty
 from armwright.program.flow_analysis.state import LAST, Activation, Called, FlowState
-from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.diagnostic import labels
+from armwright.program.language.kinds import BY_VALUE, VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 # Longest chain of calls that is analysed.
 _MAX_CALLS = 6
-_BY_VALUE = (VariableKind.SCALAR, VariableKind.TRANS)
 
 
 def call(context: Context, node: tree.Call) -> None:
@@ -62,8 +62,17 @@ def _follow_unknown(context: Context, procedure: ProcedureSymbols) -> None:
     facts.uncertainties = (Uncertainty(everything=True, excepted=excepted, moves_frames=True, aliases=True),)
     with state.in_procedure(activation):
         context.follow(*procedure.node.body.statements)
+        if procedure.is_function and not state.ended:
+            _report_missing_return(state, procedure)
     facts.uncertainties, state.ended = (), False
     facts.roll_back(mark)
+
+
+def _report_missing_return(state: FlowState, procedure: ProcedureSymbols) -> None:
+    node = procedure.node
+    text = f"FUNCTION `{node.name.text}` may end without a value"
+    here, advice = labels(node.head, "declared here"), "write a RETURN in front of this END"
+    state.report("E234", text, node.body.end, "no RETURN leads past here", secondary=here, advice=advice)
 
 
 # ---- parameters ------------------------------------------------------------------------------------------------------
@@ -73,7 +82,7 @@ def _require_arguments(state: FlowState, procedure: ProcedureSymbols, node: tree
     """Report arguments without a value, except variables that are passed by reference."""
     for parameter, argument in zip(procedure.parameters, node.arguments, strict=False):
         kind = procedure.types.get(parameter)
-        by_value = kind is not None and not kind.sizes and kind.kind in _BY_VALUE
+        by_value = kind is not None and not kind.sizes and kind.kind in BY_VALUE and parameter not in procedure.inout
         if by_value or not isinstance(argument, tree.Name | tree.Index):
             require_value(state, argument)
         else:
@@ -96,7 +105,11 @@ def _activation(context: Context, procedure: ProcedureSymbols, node: tree.Call |
         elif argument is None:
             state.table.mark_assigned(own)
         else:
-            bindings[key] = _parameter_slot(state, argument, kind, own, node.span if node else argument.span)
+            span = node.span if node else argument.span
+            if key in procedure.inout and kind is not None and not kind.sizes and kind.kind in BY_VALUE:
+                bindings[key] = state.variable(argument)
+            else:
+                bindings[key] = _parameter_slot(state, argument, kind, own, span)
     return Activation(scope=state.symbols.scope(procedure.node.name.key), bindings=bindings)
 
 

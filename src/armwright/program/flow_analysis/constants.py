@@ -37,6 +37,9 @@ def constant_value(node: tree.Expression, known: Known) -> float | None:
 
 def condition_value(node: tree.Expression, known: Known) -> bool | None:
     """Return the value of a condition; None where it is not constant."""
+    if isinstance(node, tree.Name):
+        value = known(node)
+        return None if value is None else bool(value)
     if isinstance(node, tree.Unary) and node.operation == "NOT":
         inner = condition_value(node.operand, known)
         return None if inner is None else not inner

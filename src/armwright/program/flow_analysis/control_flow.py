@@ -204,6 +204,12 @@ def end(context: Context, node: tree.Halt | tree.Retry) -> None:
     context.state.ended, context.state.end_span = True, node.span if is_valid else None
 
 
+def return_(context: Context, node: tree.Return) -> None:
+    """End the path of a FUNCTION with its value."""
+    require_value(context.state, node.value)
+    context.state.ended, context.state.end_span = True, node.span
+
+
 STEPS: Steps = {
     tree.Block: lambda context, node: context.follow(*node.statements),
     tree.If: if_,
@@ -218,6 +224,7 @@ STEPS: Steps = {
     tree.Try: try_,
     tree.Retry: end,
     tree.Halt: end,
+    tree.Return: return_,
     tree.Call: call,
     tree.Poison: lambda context, node: context.state.forget(context.side_effects(node)),
 }

@@ -194,6 +194,9 @@ def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
         targets = (node.variable,)
     elif isinstance(node, tree.ReadVisions):
         targets = node.targets
+    elif isinstance(node, tree.Call) and (callee := scope.symbols.procedures.get(node.name.key)) is not None:
+        pairs = zip(callee.parameters, node.arguments, strict=False)
+        targets = tuple(argument for parameter, argument in pairs if parameter in callee.inout)
     for target in targets:
         name = written_name(target, own)
         if name is None or is_any_element(name) or not isinstance(target, tree.Name | tree.Index):

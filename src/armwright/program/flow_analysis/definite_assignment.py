@@ -9,6 +9,9 @@ from armwright.program.semantics.builtins import WITH_AXIS
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
+# What a value of each kind may be.
+_EXAMPLES = {VariableKind.SCALAR: "100", VariableKind.BOOLEAN: "TRUE", VariableKind.TEXT: '"text"'}
+
 
 def require_value(state: FlowState, *nodes: tree.Expression | None) -> None:
     """Report each variable in expressions that has no value, once."""
@@ -61,7 +64,7 @@ def _require_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
         return
     code, note, advice, here = "E304", "", "", scope.declaration_labels(key)
     if not is_frame:
-        value = "100" if kind and kind.kind is VariableKind.SCALAR else "( twelve numbers )"
+        value = "( twelve numbers )" if kind is None else _EXAMPLES.get(kind.kind, "( twelve numbers )")
         code, advice = "E303", f"write `{text} = {value} ;` before"
     elif state.cell is None and slot == key and isinstance(node, tree.Name):
         # A cell file may give a value to the frames of the program, and to no others.

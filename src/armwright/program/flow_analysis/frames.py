@@ -34,6 +34,8 @@ def assign(state: FlowState, node: tree.Assign) -> None:
         state.set_number(name, None, node.span)
         if not is_any_element(name):
             state.steps.set(name, step)
+    elif (name := state.variable(target)) is not None:
+        state.set_number(name, None, node.span)
 
 
 def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:

@@ -1,4 +1,4 @@
-"""PRINT: its items need a value."""
+"""PRINT and LOG: their items need a value."""
 
 from armwright.program.flow_analysis.context import Steps, of_state
 from armwright.program.flow_analysis.definite_assignment import require_value
@@ -6,9 +6,9 @@ from armwright.program.flow_analysis.state import FlowState
 from armwright.program.syntax import tree
 
 
-def print_(state: FlowState, node: tree.Print) -> None:
-    """Require a value of the items of a PRINT."""
-    require_value(state, *(item for item in node.items if not isinstance(item, tree.String)))
+def written(state: FlowState, node: tree.Print | tree.Log) -> None:
+    """Require a value of what is written."""
+    require_value(state, *node.items)
 
 
-STEPS: Steps = {tree.Print: of_state(print_)}
+STEPS: Steps = {tree.Print: of_state(written), tree.Log: of_state(written)}

@@ -121,7 +121,7 @@ class SideEffectAnalysis:
             return NOTHING
         effects = self._procedures.get(call.name.key, NOTHING)
         arguments = dict(zip(procedure.parameters, call.arguments, strict=False))
-        return _in_names_of_caller(effects, call.name.key, arguments, scope)
+        return _in_names_of_caller(effects, call.name.key, arguments, scope, inout=procedure.inout)
 
     def _solve_procedures(self) -> None:
         """Compute the side effects of procedures, through all that they call, by fixed-point iteration."""
@@ -259,7 +259,12 @@ def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
 
 
 def _in_names_of_caller(
-    effects: SideEffects, procedure: str, arguments: Mapping[str, tree.Expression], scope: Scope
+    effects: SideEffects,
+    procedure: str,
+    arguments: Mapping[str, tree.Expression],
+    scope: Scope,
+    *,
+    inout: frozenset[str],
 ) -> SideEffects:
     """Return the side effects of a procedure in the names of its caller; those on its locals are dropped."""
 
@@ -271,7 +276,11 @@ def _in_names_of_caller(
             return name
         argument = arguments.get(key) if owner == procedure else None
         # Numbers and TRANS are passed by value, arrays by reference.
-        if argument is None or (value and not bracket) or (bracket and not isinstance(argument, tree.Name)):
+        if (
+            argument is None
+            or (value and not bracket and key not in inout)
+            or (bracket and not isinstance(argument, tree.Name))
+        ):
             return ""
         passed = written_name(argument, scope)
         return f"{passed}{bracket}{indices}" if passed else ""

@@ -1,5 +1,6 @@
 """The abstract state at one point of a program: frames, values, the arm used last, and the diagnostics so far."""
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Unpack
@@ -22,6 +23,8 @@ from armwright.program.syntax import tree
 
 # The key of the arm that was named or moved last; no variable has it.
 LAST = "(last)"
+# Values of the language that are the same at all times; truth values as numbers.
+_VALUES = {"PI": math.pi, "TRUE": 1.0, "FALSE": 0.0}
 # Calls named in a message: the innermost ones.
 _MAX_CALLS = 3
 
@@ -173,6 +176,9 @@ class FlowState:
         if isinstance(node, tree.Binary | tree.Unary):
             result = constants.constant_value(node, self.constant)
             return None if result is None else (result, node.span)
+        if isinstance(node, tree.Name) and self.now.scope.is_value(node.key):
+            value = _VALUES.get(node.key)
+            return None if value is None else (value, node.span)
         name = self.variable(node, VariableKind.SCALAR)
         return None if name is None or is_any_element(name) else self.numbers[name]
 

@@ -111,7 +111,7 @@ class _Layout:
     def program(self, node: tree.Program) -> None:
         """Lay a whole program out."""
         for header in node.headers:
-            if isinstance(header, tree.Declaration):
+            if isinstance(header, tree.Declaration | tree.Constant):
                 self._declaration(header)
                 continue
             self._row(header.span.start, 0)
@@ -126,10 +126,10 @@ class _Layout:
         self._row(end.start, 0, comment_indent=INDENT)
         self._row(last.start, 0)
 
-    def _declaration(self, node: tree.Declaration) -> None:
+    def _declaration(self, node: tree.Declaration | tree.Constant) -> None:
         start = node.span.start
         before = self._before(start)
-        if before.word == "VAR":
+        if before.word in ("VAR", "CONST"):
             self._row(before.start, 0, continuation=_DECLARATION + INDENT)
         else:
             self._row(start, _DECLARATION, continuation=INDENT)

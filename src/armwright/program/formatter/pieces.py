@@ -169,7 +169,9 @@ class _Names:
         self._procedures: dict[str, str] = {}
         self._own: list[tuple[Span, dict[str, str]]] = []
         self._declared = {name.span.start for name in _declared_in(program.declarations)}
+        self._declared |= {constant.name.span.start for constant in program.constants}
         self._globals = _as_declared(program.declarations)
+        self._globals |= {constant.name.key: constant.name.text for constant in program.constants}
         for procedure in program.procedures:
             name = procedure.name
             self._procedures.setdefault(name.key, name.text)

@@ -12,6 +12,12 @@ class VariableKind(enum.StrEnum):
     TRANS = "TRANS"
     FRAME = "FRAME"
     EVENT = "EVENT"
+    BOOLEAN = "BOOLEAN"
+    TEXT = "TEXT"
+
+
+# Kinds of which a procedure gets a value, and no variable, where its head does not say otherwise.
+BY_VALUE = frozenset((VariableKind.SCALAR, VariableKind.TRANS, VariableKind.BOOLEAN, VariableKind.TEXT))
 
 
 @attrs.frozen

@@ -1,4 +1,9 @@
-"""What canonical names tell by their form."""
+"""What names tell by their form."""
+
+import re
+
+# What a log may be called: its file has this name.
+LOG_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,40}")
 
 
 def is_arm(name: str) -> bool:

@@ -59,6 +59,20 @@ RLO_2_HEADERS = {
 RLO_2_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
 RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 
+# Values that need no argument. What a program, its procedures or its cell call so comes first.
+VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE"))
+
+# Types, and what starts a part in front of BEGIN, that are reserved nowhere: programs may use all of them as names.
+TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
+HEADERS_IN_CONTEXT = ("CONST", "FUNCTION")
+# How a parameter is passed, in front of its name.
+PARAMETER_MODES = ("IN", "INOUT")
+# What starts a statement only in front of a text.
+STATEMENTS_BEFORE_TEXT = ("LOG",)
+WORDS_IN_CONTEXT = frozenset(
+    (*TYPES_IN_CONTEXT, *HEADERS_IN_CONTEXT, *PARAMETER_MODES, *STATEMENTS_BEFORE_TEXT, "RETURN")
+)
+
 # What other languages call a statement, and what they have and RLO has not.
 FOREIGN_STATEMENTS = {
     **dict.fromkeys(("STOP", "EXIT", "QUIT", "ABORT"), "HALT"),
@@ -78,7 +92,7 @@ UNSUPPORTED_STATEMENTS = {
         "IF, WHILE and FOR contain one statement and have no end keyword; write `BEGIN ... END` around several",
     ),
     "CALL": "a procedure is called by its name: `name(...)`",
-    "RETURN": "a procedure returns at its END, without a value",
+    "RETURN": "a procedure returns at its END; a FUNCTION returns a value by `RETURN value`",
 }
 
 COMPARISONS = ("<", "<=", "=", "<>", ">=", ">")
@@ -149,7 +163,7 @@ VOCABULARIES = {
         headers=("VAR", *RLO_2_HEADERS),
         statements=(*STATEMENTS, *RLO_2_STATEMENTS, "BEGIN"),
         block_ends=("END", "UNTIL", "COEND", "PRIORITY", "RECOVER", "ELSE"),
-        types=(*TYPES, "EVENT"),
+        types=(*TYPES, "EVENT", *TYPES_IN_CONTEXT),
         plain_clauses=(*PLAIN_CLAUSES, "ON"),
         with_clauses=(*WITH_CLAUSES, *RLO_2_WITH_CLAUSES),
         reserved=_RLO_83_RESERVED | _RLO_2_RESERVED,

@@ -11,15 +11,25 @@ from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
-from armwright.program.language.words import BLOCK_CLOSERS, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
+from armwright.program.language.words import (
+    BLOCK_CLOSERS,
+    SENSORS,
+    STATEMENT_PHRASES,
+    STATEMENTS_BEFORE_TEXT,
+    VALUES,
+    VOCABULARIES,
+    WORDS_IN_CONTEXT,
+    Standard,
+)
 from armwright.program.language_server.analysis import Analysis, LexicalContext, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS
 from armwright.program.semantics.cell_symbols import WORLD
+from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
 from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -41,7 +51,9 @@ _SNIPPETS = {
     "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
-    "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,EVENT|} ;"),),
+    "FUNCTION": (("FUNCTION ...", "FUNCTION ${1:name} (${2:n : SCALAR}) : SCALAR ;\nBEGIN\n  RETURN $0\nEND ;"),),
+    "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
+    "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
 # How a word that wants more is written on.
 _WORD_SNIPPETS = {
@@ -51,6 +63,7 @@ _WORD_SNIPPETS = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
     "FORCE": "FORCE ${1:ARM_1}",
+    "LOG": 'LOG "${1:name}" (${2:value})',
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
@@ -76,6 +89,7 @@ class _OperandRule:
         arms: whether an arm may.
         devices: whether a device may.
         functions: which functions of the language may.
+        values: which values of the language may.
         words: other words with a meaning at this position.
     """
 
@@ -83,14 +97,24 @@ class _OperandRule:
     arms: bool = False
     devices: bool = False
     functions: tuple[str, ...] = ()
+    values: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
 
 
-_STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
-_MEASURES = ("DIST", *WITH_AXIS)
+_TRUTHS = ("FALSE", "TRUE")
+_STEPS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.TRANS)
+_NUMBERS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.SCALAR)
 _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
-_ANY_VALUE = _OperandRule(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
-_NUMBER = _OperandRule(kinds=_SCALAR, functions=_MEASURES)
+_ANY_VALUE = _OperandRule(
+    kinds=frozenset(VariableKind) - {VariableKind.EVENT},
+    arms=True,
+    functions=tuple(FUNCTIONS),
+    values=tuple(sorted(VALUES)),
+)
+_NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
+_CONDITION = _OperandRule(kinds=frozenset((VariableKind.SCALAR, VariableKind.BOOLEAN)), functions=_NUMBERS)
+_CONDITION = attrs.evolve(_CONDITION, values=("PI", "TIME", *_TRUTHS), words=("NOT",))
+_TEXT = _OperandRule(kinds=frozenset((VariableKind.TEXT,)), functions=("TEXT",))
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
 _TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
 _STEP = _OperandRule(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
@@ -100,11 +124,13 @@ _RULES_BY_KIND = {
     VariableKind.TRANS: _STEP,
     VariableKind.FRAME: _POSE,
     VariableKind.EVENT: _EVENT,
+    VariableKind.BOOLEAN: _CONDITION,
+    VariableKind.TEXT: _TEXT,
 }
 # By what the parser calls it in its messages.
 _RULES_BY_NAME: Mapping[str, _OperandRule] = {
     "a value or a text": _ANY_VALUE,
-    "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
+    "a condition": _CONDITION,
     **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
     **dict.fromkeys(("an index", "the name of a SCALAR"), _OperandRule(kinds=_SCALAR)),
     **dict.fromkeys(("a pose", "the name of a FRAME or an arm"), _POSE),
@@ -120,9 +146,14 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
 # What functions take.
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     **dict.fromkeys(WITH_AXIS, _OperandRule(words=AXES)),
+    "TEXT": _ANY_VALUE,
     "DIST": _POSE,
-    "INV": _STEP,
-    **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
+    **dict.fromkeys(("INV", *MEASURES), _STEP),
+    **{
+        name: _NUMBER
+        for name, signature in FUNCTIONS.items()
+        if signature.argument_types == ACCEPTED_TYPES[ExpressionType.SCALAR]
+    },
 }
 
 
@@ -153,7 +184,8 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
             items += [*factory.procedures(), *factory.names(_ANY_VALUE.kinds, starts=True)]
     else:
         items = [*factory.arms(operand), *factory.names(operand.kinds), *factory.devices(operand)]
-        items += [*factory.functions(operand), *factory.words(words)]
+        items += factory.own_functions(operand)
+        items += [*factory.functions(operand), *factory.values(operand), *factory.words(words)]
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
     return items
@@ -194,7 +226,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
     """Give the words that are valid at a position; of clauses those that go with the others of their MOVE."""
     following = takewhile(lambda token: token.key not in _CLAUSE_ENDS, context.following)
     written = expected.present_clauses | {token.key for token in following}
-    allowed = VOCABULARIES[std].reserved
+    allowed = VOCABULARIES[std].reserved | (WORDS_IN_CONTEXT if std is Standard.RLO_2 else frozenset())
     # What ends a block is not offered after each of its statements, unless it is being written.
     if not expected.starts_statement and context.word.start == context.word.end:
         allowed = allowed - BLOCK_CLOSERS - {"RECOVER"}
@@ -209,6 +241,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
             yield word
     if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
         yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
+        yield from STATEMENTS_BEFORE_TEXT
 
 
 class _ItemFactory:
@@ -295,9 +328,23 @@ class _ItemFactory:
             cased, meaning = self._match_case(name), WORDS[name]
             yield self._item(cased, Kind.Function, f"{cased}($1)", meaning.syntax, meaning.text)
 
+    def values(self, operand: _OperandRule) -> Iterator[CompletionItem]:
+        """Give values of the language that nothing else is called like."""
+        for name in filter(self._scope.is_value, operand.values):
+            yield self._item(self._match_case(name), Kind.Constant, "", WORDS[name].syntax, WORDS[name].text)
+
+    def own_functions(self, operand: _OperandRule) -> Iterator[CompletionItem]:
+        """Give the functions of the program that have a value of the right kind."""
+        for procedure in self._scope.symbols.procedures.values():
+            if procedure.result is not None and procedure.result.kind in operand.kinds:
+                name = procedure.node.name.text
+                yield self._item(name, Kind.Function, f"{name}($1)", signature(procedure.node)[0])
+
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""
         for procedure in self._scope.symbols.procedures.values():
+            if procedure.is_function:
+                continue
             name = procedure.node.name.text
             text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
             yield self._item(name, Kind.Function, text, signature(procedure.node)[0])

@@ -10,7 +10,14 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import RLO_2_TYPES, SENSORS, STATEMENT_PHRASES, VOCABULARIES, Standard
+from armwright.program.language.words import (
+    RLO_2_TYPES,
+    SENSORS,
+    STATEMENT_PHRASES,
+    VOCABULARIES,
+    WORDS_IN_CONTEXT,
+    Standard,
+)
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.line_numbers import blank_line_numbers
@@ -19,7 +26,7 @@ _VOCABULARY = VOCABULARIES[Standard.RLO_2]
 
 # Every reserved word is in one of these four.
 DECLARATIONS = frozenset(_VOCABULARY.headers)
-TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES))
+TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES)) - WORDS_IN_CONTEXT
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 

@@ -61,14 +61,18 @@ def _describe_token(analysis: Analysis, token: Token) -> _Description | None:
 
 def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
     """Return the head of a procedure on one line, and where its parameters stand in that."""
-    text, spans, separator = f"PROCEDURE {procedure.name.text}", [], " ("
+    word = "PROCEDURE" if procedure.result is None else "FUNCTION"
+    text, spans, separator = f"{word} {procedure.name.text}", [], " ("
     for declaration in procedure.parameters:
+        mode = f"{declaration.mode} " if declaration.mode else ""
         for name in declaration.names:
-            text += separator + name.text
+            text += separator + mode + name.text
+            mode = ""
             spans.append((len(text) - len(name.text), len(text)))
             separator = ", "
         text += f" : {_type_text(declaration.type)}"
-    return text + ")" * bool(spans), tuple(spans)
+    text += ")" * bool(spans)
+    return text if procedure.result is None else f"{text} : {_type_text(procedure.result)}", tuple(spans)
 
 
 def _type_text(written: tree.TypeName) -> str:
@@ -105,7 +109,7 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = key, [f"a unit of {dimension(key)}"]
         case NameKind.AXIS:
             description = key, [f"the {key.lower()} axis"]
-        case NameKind.FUNCTION | NameKind.SENSOR if (word := word_doc(key)) is not None:
+        case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             description = word.syntax + value, [word.text]
     return description

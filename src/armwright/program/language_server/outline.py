@@ -96,11 +96,11 @@ def _declaration_lines(analysis: Analysis) -> Iterator[_Lines]:
     for before, token in pairwise(analysis.compiled.tokens):
         if token.kind is not TokenKind.KEYWORD and before.kind is not TokenKind.KEYWORD:
             continue
-        if part is not None and token.key in ("VAR", "BEGIN", "PROCEDURE", "IMPORT", "UNITS"):
+        if part is not None and token.key in ("VAR", "BEGIN", "PROCEDURE", "FUNCTION", "CONST", "IMPORT", "UNITS"):
             yield line_of(part.start), line_of(before.end)
             part = None
         part = before if before.key == "VAR" else part
-        if before.key == "PROCEDURE" and depth == 0:
+        if before.key in ("PROCEDURE", "FUNCTION") and depth == 0:
             head = before
         depth += (before.key in _OPENING) - (before.key in _CLOSING)
         if before.key == "END" and depth <= 0 and head is not None:

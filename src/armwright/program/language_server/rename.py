@@ -130,5 +130,5 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
-    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE)
+    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE)
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

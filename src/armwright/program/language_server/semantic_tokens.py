@@ -7,14 +7,26 @@ from armwright.program.language.kinds import VariableKind
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import RLO_2_TYPES, TYPES
+from armwright.program.language.words import RLO_2_TYPES, TYPES, TYPES_IN_CONTEXT
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _NAMES = ("variable", "parameter", "event", "function", "property", "enumMember")
 KINDS = ("keyword", "type", *_NAMES, "number", "string", "comment", "operator")
-MODIFIERS = ("declaration", "modification", "readonly", "defaultLibrary", "frame", "trans", "scalar", "array", "arm")
+MODIFIERS = (
+    "declaration",
+    "modification",
+    "readonly",
+    "defaultLibrary",
+    "frame",
+    "trans",
+    "scalar",
+    "array",
+    "arm",
+    "boolean",
+    "text",
+)
 _COMMENT = KINDS.index("comment")
 _TOKEN_STYLES = {
     TokenKind.NUMBER: (KINDS.index("number"), 0),
@@ -22,7 +34,7 @@ _TOKEN_STYLES = {
     TokenKind.SYMBOL: (KINDS.index("operator"), 0),
 }
 _OPERATORS = frozenset(("+", "-", "*", "/", "=", "<", ">", "<=", ">=", "<>"))
-_TYPES = frozenset((*TYPES, *RLO_2_TYPES, *UNITS))
+_TYPES = frozenset((*TYPES, *RLO_2_TYPES, *TYPES_IN_CONTEXT, *UNITS))
 _BIT = {name: 1 << at for at, name in enumerate(MODIFIERS)}
 _NAME_STYLES = {
     NameKind.PROCEDURE: ("function", 0),
@@ -32,6 +44,7 @@ _NAME_STYLES = {
     NameKind.UNIT: ("type", _BIT["defaultLibrary"]),
     NameKind.SENSOR: ("keyword", 0),
     NameKind.AXIS: ("enumMember", _BIT["readonly"]),
+    NameKind.VALUE: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["scalar"]),
 }
 
 # A token in a line: its start and length in columns; its kind and modifiers as numbers.

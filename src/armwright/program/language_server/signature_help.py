@@ -9,7 +9,7 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import word_doc
-from armwright.program.semantics.builtins import FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import FUNCTIONS, MEASURES, WITH_AXIS
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _PARAMETERS = {
@@ -17,6 +17,14 @@ _PARAMETERS = {
     "XYZ": ("x", "y", "z"),
     "INV": ("step",),
     "DIST": ("frame", "frame"),
+    "TEXT": ("value",),
+    "RPY": ("roll", "pitch", "yaw"),
+    "ROT": ("x", "y", "z", "angle"),
+    **dict.fromkeys(MEASURES, ("pose",)),
+    **dict.fromkeys(("ABS", "SQRT", "ASIN", "ACOS", "ROUND"), ("number",)),
+    **dict.fromkeys(("SIN", "COS", "TAN"), ("angle",)),
+    "ATAN2": ("y", "x"),
+    **dict.fromkeys(("MOD", "MIN", "MAX"), ("a", "b")),
     **dict.fromkeys(WITH_AXIS, ("X | Y | Z",)),
 }
 

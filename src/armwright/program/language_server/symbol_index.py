@@ -31,6 +31,7 @@ class NameKind(enum.Enum):
     UNIT = "unit"
     SENSOR = "sensor"
     AXIS = "axis"
+    VALUE = "value of the language"
     UNKNOWN = "unknown name"
 
 
@@ -133,7 +134,7 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
     key, start, end = token.key, token.start, token.end
     procedures = scope.symbols.procedures
     is_called = next_key == "(" and not scope.is_local(key)
-    if previous == "PROCEDURE" or (is_called and key in procedures):
+    if previous in ("PROCEDURE", "FUNCTION") or (is_called and key in procedures):
         procedure = procedures.get(key)
         declares = procedure is not None and procedure.node.name.span.start == start
         return Occurrence(start, end, key, NameKind.PROCEDURE, declares=declares)
@@ -156,6 +157,7 @@ def _classify_variable(token: Token, scope: Scope) -> Occurrence:
     kind, declared = names.types.get(key), names.declared.get(key)
     if owner is None and kind is None and declared is None:
         what = NameKind.PROCEDURE if key in symbols.procedures else NameKind.UNKNOWN
+        what = NameKind.VALUE if scope.is_value(key) else what
         return Occurrence(token.start, token.end, key, what)
     declares = declared is not None and declared.span.start == token.start
     return Occurrence(token.start, token.end, key, NameKind.VARIABLE, owner, kind, declares)

@@ -13,7 +13,14 @@ import attrs
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, VOCABULARIES, Standard, Vocabulary
+from armwright.program.language.words import (
+    BLOCK_CLOSERS,
+    BLOCK_OPENERS,
+    HEADERS_IN_CONTEXT,
+    VOCABULARIES,
+    Standard,
+    Vocabulary,
+)
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
@@ -156,7 +163,7 @@ def _split_parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[b
     index = 0
     while index < len(tokens):
         is_header = True
-        if _is_header(tokens[index], words):
+        if _is_header(tokens[index], words) or _is_header_in_context(tokens, index):
             end = _end_of_header(tokens, index)
         elif _begins_declaration(tokens, index):
             end = _end_of_variables(tokens, index)
@@ -168,6 +175,12 @@ def _split_parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[b
 
 def _is_header(token: Token, words: Vocabulary) -> bool:
     return token.kind is TokenKind.KEYWORD and token.key in words.headers
+
+
+def _is_header_in_context(tokens: Sequence[Token], index: int) -> bool:
+    """Whether a word that is reserved nowhere starts a header here: a name follows it."""
+    pair = tokens[index : index + 2]
+    return len(pair) > 1 and pair[0].key in HEADERS_IN_CONTEXT and pair[1].kind is TokenKind.NAME
 
 
 def _begins_declaration(tokens: Sequence[Token], index: int) -> bool:
@@ -184,7 +197,7 @@ def _begins_declaration(tokens: Sequence[Token], index: int) -> bool:
 def _end_of_header(tokens: Sequence[Token], index: int) -> int:
     if tokens[index].key == "VAR":
         return _end_of_variables(tokens, index)
-    if tokens[index].key != "PROCEDURE":
+    if tokens[index].key not in ("PROCEDURE", "FUNCTION"):
         return _index_after(tokens, index, ";")
     index, depth = _index_after(tokens, index, "BEGIN"), 1
     while index < len(tokens) and depth:
@@ -228,7 +241,8 @@ class _InputParser:
     def parse_headers(self, part: Sequence[Token]) -> None:
         """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
         first, last = part[0], part[-1]
-        tokens = [*(_synthetic_tokens("VAR", index=first.start) if first.kind is TokenKind.NAME else ()), *part]
+        is_bare = first.kind is TokenKind.NAME and not _is_header_in_context(part, 0)
+        tokens = [*(_synthetic_tokens("VAR", index=first.start) if is_bare else ()), *part]
         if _block_depth(part) <= 0:
             semicolon = () if last.key in (";", ".") else (";",)
             tokens += _synthetic_tokens(*semicolon, "BEGIN", "END", ".", index=last.end)
@@ -237,6 +251,8 @@ class _InputParser:
         for header in program.headers:
             if isinstance(header, tree.Declaration):
                 self._names.update(name.key for name in header.names)
+            elif isinstance(header, tree.Constant):
+                self._names.add(header.name.key)
             elif isinstance(header, tree.Procedure):
                 self._procedures.add(header.name.key)
 

@@ -34,7 +34,7 @@ def declared_names(headers: Iterable[tree.Header]) -> dict[str, tree.Name]:
     for header in headers:
         if isinstance(header, tree.Declaration):
             names_.update((name.key, name) for name in header.names)
-        elif isinstance(header, tree.Procedure):
+        elif isinstance(header, tree.Procedure | tree.Constant):
             names_[header.name.key] = header.name
     return names_
 
@@ -78,6 +78,9 @@ def redeclare(
                 remaining.append(rename_names(header, new))
             if key not in names:
                 remaining.append(header)
+        elif isinstance(header, tree.Constant):
+            if header.name.key not in names or header.name.key in new:
+                remaining.append(rename_names(header, new))
         elif isinstance(header, tree.Declaration):
             in_use = tuple(_rename(name, new) for name in header.names if name.key not in names or name.key in new)
             remaining += [attrs.evolve(header, names=in_use)] if in_use else []

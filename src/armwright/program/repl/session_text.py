@@ -35,6 +35,7 @@ def program_text(
     rows += [
         ("VAR " if variable is variables[0] else "    ") + declaration_text(variable) + " ;" for variable in variables
     ]
+    rows += [f"CONST {source_text(source, header)} ;" for header in headers if isinstance(header, tree.Constant)]
     rows += [f"{source_text(source, header)} ;" for header in headers if isinstance(header, tree.Procedure)]
     rows += ["BEGIN", *(f"{source_text(source, statement)} ;" for statement in statements), "END.", ""]
     return formatted(Source(source.name, "\n".join(rows)), std=std)
@@ -52,10 +53,12 @@ def header_title(source: Source, node: tree.Header) -> str:
     """Return a header in short."""
     if isinstance(node, tree.Declaration):
         return f"VAR {declaration_text(node)}"
+    if isinstance(node, tree.Constant):
+        return f"CONST {' '.join(source.slice(node.span).split())}"
     return " ".join(source.slice(node.head if isinstance(node, tree.Procedure) else node.span).split())
 
 
-def source_text(source: Source, node: tree.Procedure | tree.Statement) -> str:
+def source_text(source: Source, node: tree.Procedure | tree.Constant | tree.Statement) -> str:
     """Return a part of a session as it was entered, with the names that it uses now."""
     pieces, end_of_copied = [], node.span.start
     for start, end, text in sorted(_name_changes(source, node)):

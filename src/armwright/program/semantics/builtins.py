@@ -14,8 +14,8 @@ from armwright.program.syntax import tree
 AXES = ("X", "Y", "Z")
 # Functions whose argument is an axis, not a variable.
 WITH_AXIS = ("FORCE", "TORQUE")
-# Procedures of programs may have the names of these: they came later than such programs.
-PROCEDURES_MAY_HIDE = ("TORQUE",)
+# Procedures of programs may not have the names of these: all other functions came later than such programs.
+FIRST_FUNCTIONS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV", "DIST", "FORCE")
 
 
 @attrs.frozen
@@ -27,7 +27,8 @@ class Signature:
         count: how many there are.
         argument_types: what each argument may be.
         result: the type of the value; of INV it depends on the argument.
-        dimension: what a number with a unit must measure.
+        dimension: what a number with a unit must measure; None where it may measure anything.
+        more: whether there may be more arguments than that.
     """
 
     parameters: str
@@ -35,17 +36,31 @@ class Signature:
     argument_types: frozenset[ExpressionType]
     result: ExpressionType
     dimension: Dimension | None = None
+    more: bool = False
 
 
 _SCALARS = ACCEPTED_TYPES[ExpressionType.SCALAR]
 _FRAMES = ACCEPTED_TYPES[ExpressionType.FRAME]
-_INVERTIBLE = ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE}
+_POSES = ACCEPTED_TYPES[ExpressionType.TRANS] | {ExpressionType.FRAME}
+_INVERTIBLE = _POSES | {ExpressionType.INVERSE}
+_PRINTABLE = frozenset(ExpressionType) - {ExpressionType.EVENT}
+_NUMBER, _TRANS = ExpressionType.SCALAR, ExpressionType.TRANS
+# Numbers out of poses: positions, angles of roll, pitch and yaw, and the one rotation about an axis.
+MEASURES = ("X", "Y", "Z", "ROLL", "PITCH", "YAW", "ANGLE", "AXISX", "AXISY", "AXISZ")
 FUNCTIONS: Mapping[str, Signature] = {
     "XYZ": Signature("three lengths", 3, _SCALARS, ExpressionType.TRANS, "length"),
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), Signature("one angle", 1, _SCALARS, ExpressionType.TRANS, "angle")),
+    "TEXT": Signature("a value or more", 1, _PRINTABLE, ExpressionType.TEXT, more=True),
     "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
     "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
     **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),
+    "RPY": Signature("three angles", 3, _SCALARS, _TRANS, "angle"),
+    "ROT": Signature("the three components of an axis and an angle", 4, _SCALARS, _TRANS, "angle"),
+    **dict.fromkeys(MEASURES, Signature("one FRAME or TRANS", 1, _POSES, _NUMBER)),
+    **dict.fromkeys(("SIN", "COS", "TAN"), Signature("one angle", 1, _SCALARS, _NUMBER, "angle")),
+    **dict.fromkeys(("ABS", "SQRT", "ASIN", "ACOS", "ROUND"), Signature("one number", 1, _SCALARS, _NUMBER)),
+    **dict.fromkeys(("ATAN2", "MOD"), Signature("two numbers", 2, _SCALARS, _NUMBER)),
+    **dict.fromkeys(("MIN", "MAX"), Signature("two numbers or more", 2, _SCALARS, _NUMBER, more=True)),
 }
 _INVERSES = {ExpressionType.FRAME: ExpressionType.INVERSE, ExpressionType.INVERSE: ExpressionType.FRAME}
 
@@ -62,8 +77,9 @@ def result_type(
     """
     key, signature = node.name.key, FUNCTIONS[node.name.key]
     required = f"{key} takes {signature.parameters}"
-    if len(node.arguments) != signature.count:
-        count = counted(len(node.arguments), "argument")
+    given = len(node.arguments)
+    if given < signature.count or (given > signature.count and not signature.more):
+        count = counted(given, "argument")
         names.report("E220", f"{required}, not {count}", node.span, f"{count} here")
         return signature.result if key != "INV" else None
     if key in WITH_AXIS:

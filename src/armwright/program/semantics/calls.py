@@ -2,15 +2,15 @@
 
 import attrs
 
-from armwright.errors import counted
 from armwright.program.language.diagnostic import Fix, Label, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import FOREIGN_STATEMENTS, UNSUPPORTED_STATEMENTS
 from armwright.program.semantics import type_check
+from armwright.program.semantics.aliases import AliasChecker
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.expression_types import TYPE_OF_KIND, declared_type_phrase, quote_expression
+from armwright.program.semantics.expression_types import declared_type_phrase, expression_text
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
@@ -39,6 +39,7 @@ class CallChecker:
         self._names = names
         self._reference_arguments: list[_ReferenceArgument] = []
         self._changed: dict[tuple[int, str], Span] = {}
+        self._aliases = AliasChecker(names)
 
     def check(self, node: tree.Call, caller: ProcedureSymbols | None) -> None:
         """Check one call."""
@@ -48,19 +49,24 @@ class CallChecker:
             if procedure is None:
                 _report_unknown_procedure(names, node)
             else:
-                _report_wrong_count(names, node, procedure)
+                type_check.report_wrong_count(names, node, procedure)
             for argument in arguments:
                 type_check.check_any(names, argument)
             return
-        for position, (argument, parameter) in enumerate(zip(arguments, procedure.parameters, strict=True)):
-            kind = procedure.types.get(parameter)
-            if kind is None or procedure.parameters.index(parameter) != position:
-                # Its declaration has been reported.
-                type_check.check_any(names, argument)
-                continue
-            _check_argument(names, argument, procedure, parameter, kind)
+        if procedure.is_function:
+            text, label = f"`{node.name.text}` is a FUNCTION, whose value is not used here", "no statement"
+            names.report(
+                "E227",
+                text,
+                node.name.span,
+                label,
+                advice=f"use its value: `... = {expression_text(tree.Function(node.span, node.name, node.arguments))}`",
+            )
+        for argument, parameter in type_check.check_arguments(names, node, procedure):
+            kind = procedure.types[parameter]
             if kind == VariableType(VariableKind.FRAME) and isinstance(argument, tree.Name | tree.ArmName):
                 self._reference_arguments.append(_ReferenceArgument(caller, argument, procedure, parameter))
+        self._aliases.check(node, procedure)
 
     def note_change(self, node: tree.Expression, inside: ProcedureSymbols | None, span: Span) -> None:
         """Note that a statement assigns a value to a variable, or affixes or unfixes it."""
@@ -69,6 +75,7 @@ class CallChecker:
 
     def report_fixed_arguments(self) -> None:
         """Report arms and WORLD as arguments of a procedure that changes the parameter."""
+        self._aliases.report_globals()
         self._propagate_changes()
         for reference in self._reference_arguments:
             changed = self._changed.get((id(reference.procedure), reference.parameter))
@@ -77,7 +84,7 @@ class CallChecker:
             is_world = argument.key == WORLD and (caller is None or WORLD not in caller.types)
             if changed is None or not (is_arm or is_world):
                 continue
-            parameter = _parameter_text(reference.procedure, reference.parameter)
+            parameter = type_check.parameter_text(reference.procedure, reference.parameter)
             changes = f"`{reference.procedure.node.name.text}` changes its parameter `{parameter}`"
             text, label = f"{changes}, and `{argument.text}` cannot be changed", "an arm" if is_arm else _ROOT
             note = "a FRAME is passed by reference: the procedure changes the frame itself"
@@ -92,36 +99,6 @@ class CallChecker:
                 changed = self._changed.get((id(reference.procedure), reference.parameter))
                 if changed is not None:
                     self.note_change(reference.argument, reference.caller, changed)
-
-
-def _check_argument(
-    names: NameResolver, argument: tree.Expression, procedure: ProcedureSymbols, parameter: str, kind: VariableType
-) -> None:
-    what = f"parameter `{_parameter_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
-    if not kind.sizes:
-        required = TYPE_OF_KIND[kind.kind]
-        type_check.require_type(names, argument, required, "E220", what + required.value)
-    elif not isinstance(argument, tree.Name):
-        if (actual := type_check.infer_type(names, argument)) is not None:
-            text = f"{what}an {kind}, but {quote_expression(argument)} is {actual.value}"
-            names.report("E220", text, argument.span, "no array")
-    elif (array := names.type(argument)) is not None and array != kind:
-        text = f"{what}an {kind}, but `{argument.text}` is {declared_type_phrase(array)}"
-        names.report("E220", text, argument.span, f"{array}", secondary=names.declaration_labels(argument.key))
-
-
-def _parameter_text(procedure: ProcedureSymbols, parameter: str) -> str:
-    return procedure.declared[parameter].text
-
-
-def _report_wrong_count(names: NameResolver, node: tree.Call, procedure: ProcedureSymbols) -> None:
-    declared = ((", ".join(name.text for name in part.names), part.type.text) for part in procedure.node.parameters)
-    listed = ", ".join(f"{parameters} : {kind}" for parameters, kind in declared)
-    count = len(node.arguments)
-    text = f"`{node.name.text}` takes {counted(len(procedure.parameters), 'argument')}, not {count}"
-    head = labels(procedure.node.head, "declared here")
-    advice = f"its parameters are ({listed})" if procedure.parameters else ""
-    names.report("E220", text, node.span, f"{count} given here", secondary=head, advice=advice)
 
 
 def _report_unknown_procedure(names: NameResolver, node: tree.Call) -> None:

@@ -2,7 +2,7 @@
 
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
-from armwright.program.semantics import control_flow, devices, frames, headers, move, output
+from armwright.program.semantics import control_flow, devices, frames, functions, headers, move, output
 from armwright.program.semantics.calls import CallChecker
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
 from armwright.program.semantics.context import Checks, Context
@@ -38,6 +38,8 @@ def check(
     for procedure in procedures:
         with names.enter_procedure(procedure):
             Context(CHECKS, names, calls, procedure).check(*procedure.node.body.statements)
+            if procedure.is_function:
+                functions.check_function(names, procedure)
     Context(CHECKS, names, calls).check(*program.statements)
     calls.report_fixed_arguments()
     names.report_unused()

@@ -2,9 +2,20 @@
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
-from armwright.program.semantics.expression_types import ExpressionType, declared_type_phrase
+from armwright.program.semantics.expression_types import (
+    TYPE_OF_KIND,
+    ExpressionType,
+    declared_type_phrase,
+    variable_phrase,
+)
 from armwright.program.semantics.quantities import check_range, check_unit
-from armwright.program.semantics.type_check import check_any, require_condition, require_quantity, require_type
+from armwright.program.semantics.type_check import (
+    check_any,
+    report_constant_assignment,
+    require_condition,
+    require_quantity,
+    require_type,
+)
 from armwright.program.syntax import tree
 
 
@@ -37,7 +48,9 @@ def for_(context: Context, node: tree.For) -> None:
         names.mark_used(variable.names)
     else:
         kind = names.type(variable)
-        if kind is not None and kind != VariableType(VariableKind.SCALAR):
+        if names.scope.is_constant(variable.key):
+            report_constant_assignment(names, variable)
+        elif kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
             message = f"FOR counts with a SCALAR, but `{variable.text}` is {declared_type_phrase(kind)}"
             names.report("E229", message, variable.span, str(kind), secondary=names.declaration_labels(variable.key))
@@ -92,6 +105,17 @@ def retry(context: Context, node: tree.Retry) -> None:
         context.names.report("E225", text, node.span, "retry what?", note=note, advice=advice)
 
 
+def return_(context: Context, node: tree.Return) -> None:
+    """Check that a RETURN gives a value of the type of its FUNCTION."""
+    names, procedure = context.names, context.procedure
+    if procedure is None or procedure.result is None:
+        check_any(names, node.value)
+        return
+    required = TYPE_OF_KIND[procedure.result.kind]
+    what = f"`{procedure.node.name.text}` gives {variable_phrase(required)}"
+    require_type(names, node.value, required, "E217", what)
+
+
 def poison(context: Context, node: tree.Poison) -> None:
     """Report nothing of the names in a statement that could not be parsed."""
     context.names.mark_used(node.names)
@@ -112,6 +136,7 @@ CHECKS: Checks = {
     tree.Try: try_,
     tree.Retry: retry,
     tree.Halt: lambda *_: None,
+    tree.Return: return_,
     tree.Call: lambda context, node: context.calls.check(node, context.procedure),
     tree.Poison: poison,
 }

@@ -1,9 +1,10 @@
 """OPEN, GRASP, OPERATE, READ and ZERO FORCE: the arms, devices and frames that they name."""
 
 from armwright.program.language.diagnostic import did_you_mean
-from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.kinds import VariableType
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import (
+    KIND_OF_TYPE,
     ExpressionType,
     declared_type_phrase,
     expression_text,
@@ -70,7 +71,7 @@ def _arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
         element_type = infer_type(names, node)
         if element_type is None:
             return
-        kind = VariableType(VariableKind[element_type.name])
+        kind = VariableType(KIND_OF_TYPE[element_type])
     phrase = "no arm" if kind is None else declared_type_phrase(kind)
     text, label = f"{who} needs an arm, but {quote_expression(node)} is {phrase}", str(kind or "not an arm")
     advice = did_you_mean(near) or f"write the name of an arm, such as `{names.arm_names()[0]}`"

@@ -26,12 +26,17 @@ class ExpressionType(enum.Enum):
     FRAME = "a FRAME"
     EVENT = "an EVENT"
     CONDITION = "a condition"
+    TEXT = "a TEXT"
     MATRIX = "a matrix"
     INVERSE = "the inverse of a FRAME"
 
 
 # The kinds of variables as types.
-TYPE_OF_KIND = {kind: ExpressionType[kind.name] for kind in VariableKind}
+TYPE_OF_KIND = {
+    kind: ExpressionType.CONDITION if kind is VariableKind.BOOLEAN else ExpressionType[kind.name]
+    for kind in VariableKind
+}
+KIND_OF_TYPE = {expression_type: kind for kind, expression_type in TYPE_OF_KIND.items()}
 # What each kind of variable, parameter or operand takes.
 ACCEPTED_TYPES = {expression_type: frozenset({expression_type}) for expression_type in ExpressionType} | {
     ExpressionType.FRAME: frozenset({ExpressionType.FRAME, ExpressionType.MATRIX}),
@@ -41,10 +46,15 @@ ACCEPTED_TYPES = {expression_type: frozenset({expression_type}) for expression_t
 
 def type_texts(node: tree.Expression, expression_type: ExpressionType) -> tuple[str, str]:
     """Return how a message and its label name the type of an expression: ``a FRAME`` and ``FRAME``, or ``an arm``."""
-    names = {tree.ArmName: "an arm", tree.Number: "a number"}
+    names = {tree.ArmName: "an arm", tree.Number: "a number", tree.String: "a text"}
     phrase = names.get(type(node), expression_type.value)
     last = phrase.split(" ", 1)[1]
     return phrase, last if last.isupper() else phrase
+
+
+def variable_phrase(expression_type: ExpressionType) -> str:
+    """Return what a message calls a variable that holds values of a type: ``a BOOLEAN`` holds conditions."""
+    return f"a {VariableKind.BOOLEAN}" if expression_type is ExpressionType.CONDITION else expression_type.value
 
 
 def declared_type_phrase(kind: VariableType) -> str:
@@ -87,6 +97,8 @@ def _text_and_precedence(node: tree.Expression) -> tuple[str, int]:
             return text, own
         case tree.Name(text=text) | tree.ArmName(text=text) | tree.Number(text=text):
             pass
+        case tree.String(value=value):
+            text = f'"{value}"'
         case tree.Index(name=name, indices=items):
             text = f"{name.text}[{','.join(map(expression_text, items))}]"
         case tree.Function(name=name, arguments=items):

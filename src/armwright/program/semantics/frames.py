@@ -10,15 +10,24 @@ from armwright.program.semantics.expression_types import (
     quote_expression,
     type_texts,
     variable_keys,
+    variable_phrase,
 )
 from armwright.program.semantics.scopes import NameResolver
-from armwright.program.semantics.type_check import infer_type, is_world, report_world_assignment, require_type
+from armwright.program.semantics.type_check import (
+    infer_type,
+    is_world,
+    report_constant_assignment,
+    report_world_assignment,
+    require_type,
+)
 from armwright.program.syntax import tree
 
 _VALUE_PHRASES = {
     ExpressionType.SCALAR: "a number",
     ExpressionType.FRAME: "a pose",
     ExpressionType.TRANS: "a transformation",
+    ExpressionType.CONDITION: "a condition",
+    ExpressionType.TEXT: "a text",
 }
 
 
@@ -33,6 +42,8 @@ def assign(context: Context, node: tree.Assign) -> None:
         names.report("E218", text, target.span, "an arm", advice=advice)
     elif is_world(target):
         report_world_assignment(names, target)
+    elif isinstance(target, tree.Name) and names.scope.is_constant(target.key):
+        report_constant_assignment(names, target)
     else:
         required = infer_type(names, target)
         if required is ExpressionType.EVENT:
@@ -55,7 +66,7 @@ def _report_wrong_value(
         phrase, label = type_texts(value, actual)
         what = f"{_VALUE_PHRASES[required]}, but {quote_expression(value)} is {phrase}"
         advice = _value_advice(target, value, required, actual)
-    text = f"{quote_expression(target)} is {required.value} and takes {what}"
+    text = f"{quote_expression(target)} is {variable_phrase(required)} and takes {what}"
     head = target.name if isinstance(target, tree.Index) else target
     here = names.declaration_labels(*variable_keys(head))
     names.report_once("E217", text, value.span, label, variable_keys(target), secondary=here, advice=advice)
@@ -65,19 +76,23 @@ def _value_advice(
     target: tree.Expression, value: tree.Expression, required: ExpressionType, actual: ExpressionType
 ) -> str:
     name, text = expression_text(target), expression_text(value)
+    advice = ""
     match required, actual:
         case _, ExpressionType.INVERSE:
-            return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
+            advice = "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case ExpressionType.SCALAR, ExpressionType.CONDITION:
-            return f"write `IF {text} THEN {name} = 1 ELSE {name} = 0`"
+            advice = f"write `IF {text} THEN {name} = 1 ELSE {name} = 0`"
         case ExpressionType.FRAME, ExpressionType.TRANS:
-            return f"for the pose that this transformation gives from WORLD write `WORLD * {text}`"
+            advice = f"for the pose that this transformation gives from WORLD write `WORLD * {text}`"
         case ExpressionType.TRANS, ExpressionType.FRAME:
-            return f"for the transformation from WORLD to this pose write `INV(WORLD) * {text}`"
+            advice = f"for the transformation from WORLD to this pose write `INV(WORLD) * {text}`"
+        case ExpressionType.CONDITION, ExpressionType.SCALAR:
+            advice = f"write `{name} = {text} <> 0`"
+        case ExpressionType.TEXT, _:
+            advice = f"write `{name} = TEXT({text})`"
         case ((ExpressionType.FRAME | ExpressionType.TRANS), ExpressionType.SCALAR):
-            return "write twelve numbers in `( )`, or make a transformation from numbers by XYZ, ROTX, ROTY and ROTZ"
-        case _:
-            return ""
+            advice = "write twelve numbers in `( )`, or make a transformation from numbers by XYZ, ROTX, ROTY and ROTZ"
+    return advice
 
 
 def affix(context: Context, node: tree.Affix) -> None:

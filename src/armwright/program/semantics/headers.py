@@ -7,10 +7,12 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
-from armwright.program.semantics.builtins import FUNCTIONS, PROCEDURES_MAY_HIDE
+from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
+from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
+from armwright.program.semantics.type_check import infer_type
 from armwright.program.syntax import tree
 
 # More elements than this are a slip, and would take the memory of the machine.
@@ -38,6 +40,8 @@ def declare(names: NameResolver, program: tree.Program, read_import: ReadImport 
             _declare_import(names, header, read_import)
     for declaration in program.declarations:
         _declare_variables(names, names.symbols, declaration)
+    for constant in program.constants:
+        _declare_constant(names, constant)
     return [_declare_procedure(names, node) for node in program.procedures]
 
 
@@ -100,6 +104,40 @@ def _array_size(names: NameResolver, number: tree.Number) -> int | None:
     return None
 
 
+# ---- constants -----------------------------------------------------------------------------------------------------
+
+
+def _declare_constant(names: NameResolver, node: tree.Constant) -> None:
+    """Take up a constant: its type is that of its value, which is made of numbers and constants in front of it."""
+    name, kind, symbols = node.name, _constant_type(names, node), names.symbols
+    if name.key in symbols.declared:
+        _report_duplicate(names, name, symbols.declared[name.key])
+    elif name.key in symbols.types:
+        where = "an IMPORT brings" if name.key in symbols.imported else "is predeclared"
+        names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a constant of the same name")
+    else:
+        symbols.declared[name.key], symbols.types[name.key] = name, kind
+        symbols.constants.add(name.key)
+
+
+def _constant_type(names: NameResolver, node: tree.Constant) -> VariableType | None:
+    """Return what a constant holds; None where something is wrong with its value."""
+    for part in tree.walk(node.value):
+        varies = isinstance(part, tree.ArmName) or (isinstance(part, tree.Function) and part.name.key in WITH_AXIS)
+        if isinstance(part, tree.Name) and names.scope.type(part.key) is not None:
+            varies = not names.scope.is_constant(part.key)
+        if varies or (isinstance(part, tree.Name) and part.key == "TIME" and names.scope.is_value(part.key)):
+            text, note = "the value of a constant is known before the program runs", "it may use numbers, constants"
+            note += " that are declared before it, and functions of them"
+            names.report("E217", text, part.span, "this is not", note=note)
+            return None
+    actual = infer_type(names, node.value)
+    if actual is None:
+        return None
+    kind = VariableKind.TRANS if actual is ExpressionType.MATRIX else KIND_OF_TYPE.get(actual)
+    return None if kind is None else VariableType(kind)
+
+
 # ---- units ---------------------------------------------------------------------------------------------------------
 
 
@@ -136,7 +174,7 @@ def _report_unknown_unit(names: NameResolver, unit: tree.Name) -> None:
 def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadImport | None) -> None:
     path = header.path
     if read_import is None:
-        names.open_import = True
+        names.symbols.open_import = True
         note = "a name that is not declared may be one of them"
         message = f"the frames of `{path.value}` are unknown: the file was not read"
         names.report("W205", message, header.span, "not read", note=note)
@@ -145,7 +183,7 @@ def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadI
         brought = read_import(path.value)
     except ArmwrightError as error:
         # What the file would have brought is unknown, so nothing is asked of unknown names.
-        names.open_import = True
+        names.symbols.open_import = True
         names.report("E228", f"`{path.value}` cannot be imported", path.span, "not read", note=str(error))
         return
     names.imports.append(brought)
@@ -166,7 +204,9 @@ def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSy
     """Take up a procedure and its own names; where its name is taken it cannot be called, but is checked."""
     name = node.name
     parameters = tuple(parameter.key for declaration in node.parameters for parameter in declaration.names)
-    procedure = ProcedureSymbols(node=node, parameters=parameters)
+    inout = frozenset(name.key for part in node.parameters if part.mode == "INOUT" for name in part.names)
+    result = None if node.result is None else _declared_type(names, node.result)
+    procedure = ProcedureSymbols(node=node, parameters=parameters, inout=inout, result=result)
     for declaration in (*node.parameters, *node.declarations):
         _declare_variables(names, procedure, declaration)
     first = names.symbols.procedures.get(name.key)
@@ -176,7 +216,7 @@ def _declare_procedure(names: NameResolver, node: tree.Procedure) -> ProcedureSy
     elif name.key in names.symbols.types:
         where = "an IMPORT brings" if name.key in names.symbols.imported else "is predeclared"
         names.report("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
-    elif name.key in FUNCTIONS and name.key not in PROCEDURES_MAY_HIDE:
+    elif name.key in FIRST_FUNCTIONS:
         text = f"`{name.text}` is a function of the language"
         names.report("E203", text, name.span, "a procedure of the same name")
     else:

@@ -23,6 +23,8 @@ def result_type(
     result = _PRODUCTS.get((left, right)) if node.operation == "*" else None
     if left is ExpressionType.SCALAR and right is ExpressionType.SCALAR:
         result = ExpressionType.SCALAR
+    elif left is right is ExpressionType.TEXT and node.operation in ("=", "<>"):
+        result = ExpressionType.CONDITION
     elif ExpressionType.EVENT in (left, right) and None not in (left, right):
         names.report_event(node.left if left is ExpressionType.EVENT else node.right)
     elif left is not None and right is not None and result is None:
@@ -53,6 +55,8 @@ def _operand_advice(node: tree.Binary, left: ExpressionType, right: ExpressionTy
     if ExpressionType.CONDITION in (left, right):
         return "a condition is not a number; combine conditions with AND and OR"
     left_text, right_text = expression_text(node.left), expression_text(node.right)
+    if ExpressionType.TEXT in (left, right) and node.operation == "+":
+        return f"texts are joined by TEXT: write `TEXT({left_text}, {right_text})`"
     both_poses, advice = {left, right} <= _POSES, ""
     match node.operation:
         case "*":

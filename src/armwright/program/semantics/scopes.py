@@ -29,8 +29,8 @@ class NameResolver:
         self.symbols = Symbols(types=dict(PREDECLARED), std=std)
         self.imports: list[ImportedFrames] = []
         self.cell = cell
-        # Whether some IMPORT was not looked up, so that any name may be that of a frame in it.
-        self.open_import = False
+        # Of each log, in lower case, the statement that first writes it.
+        self.logs: dict[str, tree.Log] = {}
         self.scope = Scope(symbols=self.symbols)
         self._called: set[str] = set()
         self._reported: set[tuple[str, int, str]] = set()
@@ -53,7 +53,7 @@ class NameResolver:
         table.used.add(key)
         if key not in table.types:
             # Apart from the types: whoever looks for what a name was meant to be goes through all of those.
-            if not self.open_import and key not in self._undeclared_names:
+            if not self.symbols.open_import and key not in self._undeclared_names:
                 self._report_undeclared(name)
             self._undeclared_names.add(key)
             table.poisoned.add(key)

@@ -8,7 +8,7 @@ import attrs
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import UnitSystem
-from armwright.program.language.words import Standard
+from armwright.program.language.words import VALUES, Standard
 from armwright.program.semantics.cell_symbols import STATION, WORLD
 from armwright.program.syntax import tree
 
@@ -40,10 +40,19 @@ class ProcedureSymbols(SymbolTable):
     Attributes:
         node: the procedure.
         parameters: their names, in order; a name declared twice stands here twice.
+        inout: the parameters that are declared INOUT.
+        result: of a FUNCTION, the type of its value; None for a procedure, and where it was reported as wrong.
     """
 
     node: tree.Procedure
     parameters: tuple[str, ...]
+    inout: frozenset[str] = frozenset()
+    result: VariableType | None = None
+
+    @property
+    def is_function(self) -> bool:
+        """Whether it has a value."""
+        return self.node.result is not None
 
 
 @attrs.define(kw_only=True, eq=False)
@@ -53,13 +62,17 @@ class Symbols(SymbolTable):
     Attributes:
         procedures: by name.
         units: what bare numbers count.
+        constants: the names of CONST parts.
         imported: the frames that IMPORT has brought.
+        open_import: whether some IMPORT was not looked up, so that any name may be that of a frame in it.
         std: the language.
     """
 
     procedures: dict[str, ProcedureSymbols] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
+    constants: set[str] = attrs.field(factory=set)
     imported: set[str] = attrs.field(factory=set)
+    open_import: bool = False
     std: Standard = Standard.RLO_2
 
     def scope(self, procedure: str | None) -> "Scope":
@@ -99,6 +112,17 @@ class Scope:
     def type(self, key: str) -> VariableType | None:
         """Return the type of a name; None where it is unknown or was reported as wrong."""
         return self.table(key).types.get(key)
+
+    def is_constant(self, key: str) -> bool:
+        """Whether a name is that of a constant."""
+        return key in self.symbols.constants and not self.is_local(key)
+
+    def is_value(self, key: str) -> bool:
+        """Whether a name stands for a value of the language, because nothing else is called so."""
+        symbols = self.symbols
+        if key not in VALUES or symbols.std is not Standard.RLO_2 or symbols.open_import:
+            return False
+        return not self.is_local(key) and key not in symbols.types and key not in symbols.procedures
 
     def declared(self, key: str) -> tree.Name | None:
         """Return the declaration of a name; None where it has none."""

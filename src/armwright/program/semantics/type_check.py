@@ -5,6 +5,9 @@ from collections.abc import Callable
 
 import attrs
 
+from armwright.errors import counted
+from armwright.program.language.diagnostic import labels
+from armwright.program.language.kinds import VariableType
 from armwright.program.language.units import Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics import array_elements, builtins, operators
@@ -12,14 +15,17 @@ from armwright.program.semantics.builtins import FUNCTIONS, WITH_AXIS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import (
     ACCEPTED_TYPES,
+    TYPE_OF_KIND,
     ExpressionType,
     declared_type_phrase,
     expression_text,
     quote_expression,
     variable_keys,
+    variable_phrase,
 )
 from armwright.program.semantics.quantities import check_unit
 from armwright.program.semantics.scopes import NameResolver
+from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import pose_literals, tree
 
 
@@ -49,6 +55,15 @@ def is_world(node: tree.Expression) -> bool:
 def report_world_assignment(names: NameResolver, node: tree.Expression) -> None:
     """Report that the root of all frames cannot be assigned a value."""
     names.report("E218", f"{quote_expression(node)} cannot be assigned a value", node.span, "the root of all frames")
+
+
+def report_constant_assignment(names: NameResolver, node: tree.Name) -> None:
+    """Report that a constant keeps its value."""
+    names.scope.table(node.key).used.add(node.key)
+    text, label = f"`{node.text}` is a constant and keeps its value", "a constant"
+    advice = f"declare it with VAR instead of CONST, and write `{node.text} = ...` after BEGIN"
+    here = names.declaration_labels(node.key)
+    names.report_once("E218", text, node.span, label, [node.key], secondary=here, advice=advice)
 
 
 def require_type(
@@ -110,12 +125,86 @@ def _check_condition(names: NameResolver, node: tree.Expression, actual: Express
     names.report_type("E219", node, actual, f"{who} needs a condition", advice=advice)
 
 
+# ---- arguments -----------------------------------------------------------------------------------------------------
+
+
+def check_arguments(
+    names: NameResolver, node: tree.Call | tree.Function, procedure: ProcedureSymbols
+) -> list[tuple[tree.Expression, str]]:
+    """Check the arguments of a call; return each with its parameter, where the types of both are known."""
+    if len(node.arguments) != len(procedure.parameters):
+        report_wrong_count(names, node, procedure)
+        for argument in node.arguments:
+            check_any(names, argument)
+        return []
+    pairs = []
+    for position, (argument, parameter) in enumerate(zip(node.arguments, procedure.parameters, strict=True)):
+        kind = procedure.types.get(parameter)
+        if kind is None or procedure.parameters.index(parameter) != position:
+            # Its declaration has been reported.
+            check_any(names, argument)
+            continue
+        check_argument(names, argument, procedure, parameter, kind)
+        pairs.append((argument, parameter))
+    return pairs
+
+
+def _check_variable(names: NameResolver, node: tree.Expression, what: str) -> None:
+    """Check that an argument can be given a value."""
+    if isinstance(node, tree.Name) and names.scope.is_constant(node.key):
+        report_constant_assignment(names, node)
+    elif not isinstance(node, tree.Name | tree.Index | tree.ArmName | tree.Poison):
+        text = f"{what}INOUT and needs a variable, but {quote_expression(node)} is a value"
+        advice = "assign it to a variable first, and give that"
+        names.report("E220", text, node.span, "no variable", advice=advice)
+
+
+def check_argument(
+    names: NameResolver, argument: tree.Expression, procedure: ProcedureSymbols, parameter: str, kind: VariableType
+) -> None:
+    """Check that an argument is of the type of its parameter, and a variable where the parameter is INOUT."""
+    what = f"parameter `{parameter_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
+    if not kind.sizes:
+        required = TYPE_OF_KIND[kind.kind]
+        if parameter in procedure.inout:
+            _check_variable(names, argument, what)
+        require_type(names, argument, required, "E220", what + variable_phrase(required))
+    elif not isinstance(argument, tree.Name):
+        if (actual := infer_type(names, argument)) is not None:
+            text = f"{what}an {kind}, but {quote_expression(argument)} is {actual.value}"
+            names.report("E220", text, argument.span, "no array")
+    elif (array := names.type(argument)) is not None and array != kind:
+        text = f"{what}an {kind}, but `{argument.text}` is {declared_type_phrase(array)}"
+        names.report("E220", text, argument.span, f"{array}", secondary=names.declaration_labels(argument.key))
+
+
+def parameter_text(procedure: ProcedureSymbols, parameter: str) -> str:
+    """Return a parameter as its procedure declares it."""
+    return procedure.declared[parameter].text
+
+
+def report_wrong_count(names: NameResolver, node: tree.Call | tree.Function, procedure: ProcedureSymbols) -> None:
+    """Report a call with too many arguments, or too few."""
+    declared = ((", ".join(name.text for name in part.names), part.type.text) for part in procedure.node.parameters)
+    listed = ", ".join(f"{parameters} : {kind}" for parameters, kind in declared)
+    count = len(node.arguments)
+    text = f"`{node.name.text}` takes {counted(len(procedure.parameters), 'argument')}, not {count}"
+    head = labels(procedure.node.head, "declared here")
+    advice = f"its parameters are ({listed})" if procedure.parameters else ""
+    names.report("E220", text, node.span, f"{count} given here", secondary=head, advice=advice)
+
+
+# ---- rules ---------------------------------------------------------------------------------------------------------
+
+
 def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
     # A number that was reported before is NaN; it may have been meant as a name.
     return None if math.isnan(node.value) else ExpressionType.SCALAR
 
 
 def _name(names: NameResolver, node: tree.Name) -> ExpressionType | None:
+    if names.scope.is_value(node.key):
+        return ExpressionType.CONDITION if node.key in ("TRUE", "FALSE") else ExpressionType.SCALAR
     kind = names.type(node)
     return None if kind is None else array_elements.variable_type(names, node, kind)
 
@@ -135,6 +224,10 @@ def _function(names: NameResolver, node: tree.Function) -> ExpressionType | None
         is_axis = [key in WITH_AXIS and isinstance(argument, tree.Name) for argument in arguments]
         types = [None if axis else infer_type(names, node) for axis, node in zip(is_axis, arguments, strict=True)]
         return builtins.result_type(names, node, types)
+    procedure = names.resolve_call(key)
+    if procedure is not None and procedure.is_function:
+        check_arguments(names, node, procedure)
+        return None if procedure.result is None else TYPE_OF_KIND[procedure.result.kind]
     for argument in arguments:
         # A procedure may be given a whole array, and this may have been meant as a call of one.
         check_any(names, argument)
@@ -149,7 +242,7 @@ def _report_unknown_function(names: NameResolver, node: tree.Function) -> None:
     kind = names.scope.type(name.key)
     if names.resolve_call(name.key) is not None:
         message, label = f"`{name.text}` is a procedure and has no value", "a procedure"
-        advice = "call it in a statement of its own, and let it set a parameter that is a FRAME"
+        advice = "call it in a statement of its own, or declare it as a FUNCTION"
     elif kind is not None:
         names.mark_used([name.key])
         message, label = f"`{name.text}` is {declared_type_phrase(kind)} and no function", "no function"
@@ -200,6 +293,7 @@ def _matrix(names: NameResolver, node: tree.Matrix) -> ExpressionType | None:
 
 _TYPE_RULES: dict[type, Callable[..., ExpressionType | None]] = {
     tree.Number: _number,
+    tree.String: lambda _names, _node: ExpressionType.TEXT,
     tree.ArmName: lambda _names, _node: ExpressionType.FRAME,
     tree.Name: _name,
     tree.Index: _index,

@@ -392,6 +392,14 @@ def halt(tokens: TokenStream) -> tree.Halt:
     return tree.Halt(tokens.take().span)
 
 
+# "RETURN" expr
+def return_(tokens: TokenStream) -> tree.Return:
+    """Read one RETURN."""
+    start = tokens.current
+    tokens.accept_word("RETURN")
+    return tokens.node(tree.Return, start, expression(tokens, "a value", "after RETURN"))
+
+
 # name "(" [ expr { "," expr } ] ")"
 def call(tokens: TokenStream) -> tree.Call:
     """Read the call of a procedure."""

@@ -1,10 +1,13 @@
 """Parsing declarations: VAR parts, types, and what is wrong with them."""
 
+# ruff: noqa: ERA001 - each rule of the grammar stands above its function
+
 import math
 from functools import partial
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import did_you_mean
+from armwright.program.language.words import HEADERS_IN_CONTEXT, PARAMETER_MODES, TYPES_IN_CONTEXT
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
@@ -37,7 +40,7 @@ def var_part(tokens: TokenStream) -> list[tree.Declaration]:
 def _is_reserved_as_name(tokens: TokenStream) -> bool:
     """Whether a reserved word stands where a declared name should."""
     token = tokens.current
-    outside = ("VAR", "BEGIN", "END")
+    outside = ("VAR", "BEGIN", "END", *HEADERS_IN_CONTEXT)
     return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.peek().key in (",", ":")
 
 
@@ -56,6 +59,8 @@ def declarations(tokens: TokenStream) -> list[tree.Declaration]:
 def _starts_declaration(tokens: TokenStream) -> bool:
     """Whether one more declaration follows, and not BEGIN, a statement or another header."""
     token, after = tokens.current, tokens.peek()
+    if tokens.starts_header_in_context:
+        return False
     if token.kind is TokenKind.KEYWORD:
         return _is_reserved_as_name(tokens)
     if token.kind not in (TokenKind.NAME, TokenKind.ARM) or after.key in ("=", ":=", "(", "["):
@@ -98,9 +103,21 @@ def names_and_type(tokens: TokenStream, names: list[tree.Name]) -> tree.TypeName
     if not tokens.accept(":"):
         gap = tokens.gap_span()
         tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
-        if not tokens.matches(*tokens.vocabulary.types, "ARRAY"):
+        if not (tokens.matches(*tokens.vocabulary.types, "ARRAY") or tokens.matches_word(*TYPES_IN_CONTEXT)):
             raise PanicModeError
-    return _type_name(tokens)
+    return type_name(tokens)
+
+
+def mode_and_names(tokens: TokenStream, names: list[tree.Name]) -> tuple[str, tree.TypeName]:
+    """Read how parameters are passed, where that is written, the parameters, and their type.
+
+    Raises:
+        PanicModeError: there is no type.
+    """
+    mode = None
+    if tokens.matches_word(*PARAMETER_MODES) and tokens.peek().kind is TokenKind.NAME:
+        mode = tokens.accept_word(*PARAMETER_MODES)
+    return "" if mode is None else mode.key, names_and_type(tokens, names)
 
 
 def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
@@ -123,14 +140,16 @@ def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
         tokens.fail("expected a name")
 
 
-# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;
-def _type_name(tokens: TokenStream) -> tree.TypeName:
+# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] kind ;
+# kind = "SCALAR" | "TRANS" | "FRAME" | "EVENT" | "BOOLEAN" | "TEXT" ;
+def type_name(tokens: TokenStream) -> tree.TypeName:
+    """Read a type."""
     start = tokens.current
     tokens.note_expected_words(*tokens.vocabulary.types)
     sizes = _array_sizes(tokens) if tokens.accept("ARRAY") else ()
     token = tokens.current
     types, expected = tokens.vocabulary.types, f"expected {either(tokens.standard_vocabulary.types)}"
-    if tokens.accept(*types):
+    if tokens.accept(*types) or tokens.accept_word(*TYPES_IN_CONTEXT):
         span = tokens.span_since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
     if token.kind is not TokenKind.NAME:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from armwright.program.language.diagnostic import Fix
-from armwright.program.language.words import PRECEDENCE, PRECEDENCE_OF_NOT
+from armwright.program.language.words import PRECEDENCE, PRECEDENCE_OF_NOT, Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.token_stream import MAX_DEPTH, TokenStream, describe_token
@@ -98,8 +98,8 @@ def _unary(tokens: TokenStream, wants: str, where: str, lowest: int) -> tree.Exp
         return _name_or_call(tokens)
     if kind is _NUMBER or (token.key in ("-", "+") and tokens.peek().kind is _NUMBER):
         return number(tokens)
-    if token.key == "(":
-        return _parenthesised(tokens)
+    if token.key == "(" or (kind is _STRING and tokens.standard is Standard.RLO_2):
+        return _parenthesised(tokens) if token.key == "(" else _string(tokens)
     if token.key not in ("-", "+", "NOT"):
         tokens.note_expected_operand(*tokens.operand_context)
         return _report_missing_value(tokens, wants, where)
@@ -143,7 +143,13 @@ def number(tokens: TokenStream) -> tree.Number:
     return tokens.node(tree.Number, start, token.text, value, unit)
 
 
-# prim = number | arm | lvalue | name "(" expr { "," expr } ")" | "(" expr { "," expr } ")" ;
+def _string(tokens: TokenStream) -> tree.String:
+    token = tokens.take()
+    tokens.height = 1
+    return tree.String(token.span, token.text[1:-1])
+
+
+# prim = number | string | arm | lvalue | name "(" [ expr { "," expr } ] ")" | "(" expr { "," expr } ")" ;
 def _name_or_call(tokens: TokenStream) -> tree.Expression:
     tokens.height = 1
     if tokens.current.kind is _ARM:
@@ -153,10 +159,13 @@ def _name_or_call(tokens: TokenStream) -> tree.Expression:
         return _index(tokens, name)
     if tokens.current.key != "(":
         return name
-    arguments = expression_list(tokens, "a value", f"after {name.text}")
+    is_empty = tokens.standard is Standard.RLO_2 and tokens.peek().key == ")"
+    arguments = expression_list(tokens, "a value", f"after {name.text}", empty=is_empty)
     tokens.height += 1
     start = name.span
-    return tokens.node(tree.Function, start, name, arguments) if arguments else tokens.node(tree.Poison, start)
+    if not arguments and not is_empty:
+        return tokens.node(tree.Poison, start)
+    return tokens.node(tree.Function, start, name, arguments)
 
 
 def _arm(tokens: TokenStream) -> tree.ArmName:

@@ -6,15 +6,24 @@ from functools import partial
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label, did_you_mean
 from armwright.program.language.source import Span
+from armwright.program.language.words import HEADERS_IN_CONTEXT
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
-from armwright.program.syntax.declarations import declarations, names_and_type, skip_declaration, var_part
+from armwright.program.syntax.declarations import (
+    declarations,
+    mode_and_names,
+    skip_declaration,
+    type_name,
+    var_part,
+)
+from armwright.program.syntax.expressions import expression
+from armwright.program.syntax.frames import expect_equals
 from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import TokenStream, describe_token
 
 # What other languages call a procedure.
 _FOREIGN_PROCEDURE_KEYWORDS = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
-_NO_RESULTS = "a procedure returns results in its FRAME, EVENT and ARRAY parameters, or in variables of the program"
+_NO_RESULTS = "a FUNCTION has a value; a procedure returns results in its INOUT, FRAME, EVENT and ARRAY parameters"
 
 
 def parse_headers(tokens: TokenStream) -> list[tree.Header]:
@@ -22,9 +31,11 @@ def parse_headers(tokens: TokenStream) -> list[tree.Header]:
     headers_: list[tree.Header] = []
     while True:
         _skip_semicolons(tokens)
-        tokens.note_expected_words(*tokens.vocabulary.headers, "BEGIN", starts_statement=True)
+        words = (*tokens.vocabulary.headers, *HEADERS_IN_CONTEXT, "BEGIN")
+        tokens.note_expected_words(*words, starts_statement=True)
         token, after = tokens.current, tokens.peek()
-        if token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers:
+        is_header = token.kind is TokenKind.KEYWORD and token.key in tokens.vocabulary.headers
+        if is_header or tokens.starts_header_in_context:
             headers_ += parse_header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             text = "missing `VAR` before the declarations"
@@ -98,6 +109,23 @@ def _accept_begin(tokens: TokenStream) -> None:
     tokens.report_once("E115", text, tokens.current.gap, "expected `BEGIN` here", replacement="BEGIN ")
 
 
+# constants = "CONST" name "=" expr ";" { name "=" expr ";" } ;
+def _constants(tokens: TokenStream) -> list[tree.Header]:
+    tokens.accept_word("CONST")
+    constants: list[tree.Header] = []
+    while not constants or (tokens.current.kind is TokenKind.NAME and tokens.peek().key in ("=", ":=", "==")):
+        start = tokens.current
+        name = tokens.take_name()
+        tokens.check_name_length(name)
+        tokens.declared.add(name.key)
+        expect_equals(tokens, f"the constant `{name.text}`", name.text)
+        tokens.assignment_target = ""
+        value = expression(tokens, "a value", f"after `{name.text} =`")
+        constants.append(tokens.node(tree.Constant, start, name, value))
+        tokens.accept_semicolon("after the constant")
+    return constants
+
+
 # import = "IMPORT" string ";" ;
 def _import(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
@@ -131,14 +159,18 @@ def _unit(tokens: TokenStream) -> tree.Name:
 
 
 # procedure = "PROCEDURE" name [ "(" param { "," param } ")" ] ";" [ var_part ] block ";" ;
+# function  = "FUNCTION" name [ "(" param { "," param } ")" ] ":" type ";" [ var_part ] block ";" ;
 def _procedure(tokens: TokenStream) -> list[tree.Header]:
-    start = tokens.take()
+    start = tokens.accept_word("FUNCTION") or tokens.take()
     name = _procedure_name(tokens)
     tokens.procedures.add(name.key)
     parameters = _parameters(tokens) if tokens.matches("(") else []
     head = tokens.span_since(start)
-    _skip_result_type(tokens)
-    tokens.accept_semicolon("after the head of the procedure")
+    result = _result_type(tokens) if start.key == "FUNCTION" else None
+    if result is None:
+        _skip_result_type(tokens)
+    what = start.key.lower()
+    tokens.accept_semicolon(f"after the head of the {what}")
     tokens.note_expected_words("VAR", "BEGIN", starts_statement=True)
     own = var_part(tokens) if tokens.matches("VAR") else []
     while tokens.matches("VAR"):
@@ -146,8 +178,10 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
         tokens.report("E118", text, tokens.current.span, "remove this word", replacement="")
         own += var_part(tokens)
     tokens.note_expected_words("BEGIN", starts_statement=True)
+    tokens.in_function = result is not None
     body = _procedure_body(tokens, head, name)
-    procedure = tokens.node(tree.Procedure, start, head, name, tuple(parameters), tuple(own), body)
+    tokens.in_function = False
+    procedure = tokens.node(tree.Procedure, start, head, name, tuple(parameters), tuple(own), body, result)
     if tokens.matches("END") and tokens.peek().key != ".":
         tokens.report_once("E127", "`END` without BEGIN", tokens.current.span, "the procedure has ended before")
         tokens.take()
@@ -155,7 +189,7 @@ def _procedure(tokens: TokenStream) -> list[tree.Header]:
         tokens.report_once("E104", "a procedure ends with `;`", tokens.current.span, "write `;`", replacement=";")
         tokens.take()
     else:
-        tokens.accept_semicolon("after the procedure")
+        tokens.accept_semicolon(f"after the {what}")
     return [procedure]
 
 
@@ -174,7 +208,7 @@ def _procedure_name(tokens: TokenStream) -> tree.Name:
     return name
 
 
-# param = name { "," name } ":" type ;
+# param = [ "IN" | "INOUT" ] name { "," name } ":" type ;
 def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
     opening = tokens.take()
     parameters: list[tree.Declaration] = []
@@ -191,16 +225,28 @@ def _parameters(tokens: TokenStream) -> list[tree.Declaration]:
             tokens.report_once("E117", text, start.span, "leave it out", note=_NO_RESULTS)
             tokens.take()
         names: list[tree.Name] = []
-        kind = tokens.attempt(partial(names_and_type, names=names))
-        if kind is None:
+        read = tokens.attempt(partial(mode_and_names, names=names))
+        if read is None:
             tokens.skip_to(")", ";", "BEGIN", *tokens.vocabulary.headers)
-            kind = tokens.node(tree.TypeName, start, "", None)
-        parameters.append(tokens.node(tree.Declaration, start, tuple(names), kind))
+            read = "", tokens.node(tree.TypeName, start, "", None)
+        mode, kind = read
+        parameters.append(tokens.node(tree.Declaration, start, tuple(names), kind, mode))
         if not _parameter_separator(tokens):
             break
     if not tokens.accept(")"):
         tokens.insert_missing(")", "after the parameters")
     return parameters
+
+
+def _result_type(tokens: TokenStream) -> tree.TypeName:
+    """Read the type of the value of a FUNCTION."""
+    if not tokens.accept(":"):
+        gap = tokens.gap_span()
+        advice = "write `: SCALAR`, or PROCEDURE instead of FUNCTION if it has no value"
+        text = "a FUNCTION needs the type of its value"
+        tokens.report_once("E112", text, gap, "expected `:` and a type here", advice=advice)
+        return tree.TypeName(gap, "", None)
+    return tokens.attempt(type_name) or tokens.node(tree.TypeName, tokens.previous, "", None)
 
 
 def _skip_result_type(tokens: TokenStream) -> None:
@@ -275,6 +321,8 @@ def late_header(tokens: TokenStream) -> tree.Statement:
 
 _HEADERS: Mapping[str, Callable[[TokenStream], Sequence[tree.Header]]] = {
     "VAR": var_part,
+    "CONST": _constants,
+    "FUNCTION": _procedure,
     "IMPORT": _import,
     "UNITS": _units,
     "PROCEDURE": _procedure,

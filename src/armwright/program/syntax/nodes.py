@@ -127,7 +127,7 @@ class Matrix(Node):
 
 Variable: TypeAlias = Name | Index | Poison
 Mobile: TypeAlias = Name | Index | ArmName | Poison
-Expression: TypeAlias = Number | Name | Index | ArmName | Function | Unary | Binary | Matrix | Poison
+Expression: TypeAlias = Number | String | Name | Index | ArmName | Function | Unary | Binary | Matrix | Poison
 
 
 def child_nodes(node: Node) -> Iterator[Node]:

@@ -1,22 +1,22 @@
-"""Parsing what a program writes: PRINT."""
+"""Parsing what a program writes: PRINT and LOG."""
 
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression, parenthesised_list
-from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import TokenStream
 
 
-# "PRINT" "(" ( expr | string ) { "," ( expr | string ) } ")"
+# "PRINT" "(" expr { "," expr } ")"
 def print_(tokens: TokenStream) -> tree.Print:
     """Read one PRINT."""
     start = tokens.take()
-    return tokens.node(tree.Print, start, parenthesised_list(tokens, _print_item, "a value or a text", "after PRINT"))
+    return tokens.node(tree.Print, start, parenthesised_list(tokens, expression, "a value or a text", "after PRINT"))
 
 
-def _print_item(tokens: TokenStream, wants: str, where: str) -> tree.Expression | tree.String:
-    token = tokens.current
-    if token.kind is not TokenKind.STRING:
-        return expression(tokens, wants, where)
-    tokens.take()
-    tokens.height = 1
-    return tree.String(token.span, token.text[1:-1])
+# "LOG" string "(" expr { "," expr } ")"
+def log(tokens: TokenStream) -> tree.Log:
+    """Read one LOG."""
+    start = tokens.current
+    tokens.accept_word("LOG")
+    name = tokens.take()
+    items = parenthesised_list(tokens, expression, "a value", "after the name of the log")
+    return tokens.node(tree.Log, start, tree.String(name.span, name.text[1:-1]), items)

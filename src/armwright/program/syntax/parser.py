@@ -43,7 +43,9 @@ _RULES: Mapping[str, Rule] = {
     "TRY": control_flow.try_,
     "RETRY": control_flow.retry,
     "HALT": control_flow.halt,
+    "RETURN": control_flow.return_,
     "PRINT": output.print_,
+    "LOG": output.log,
     # Reported: these belong in front of BEGIN.
     **dict.fromkeys(("VAR", "IMPORT", "UNITS", "PROCEDURE"), late_header),
 }

@@ -11,7 +11,9 @@ from armwright.program.language.words import (
     BLOCK_OPENERS,
     FOREIGN_STATEMENTS,
     STATEMENT_PHRASES,
+    STATEMENTS_BEFORE_TEXT,
     UNSUPPORTED_STATEMENTS,
+    Standard,
 )
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -38,7 +40,9 @@ def statements(tokens: TokenStream, *closing: str) -> tuple[tree.Statement, ...]
         while tokens.current.key == ";":
             tokens.take()
         starts = tokens.previous.key in _BEFORE_STATEMENTS
-        tokens.note_expected_words(*(tokens.vocabulary.statements if starts else ()), *closing, starts_statement=starts)
+        words = tokens.vocabulary.statements if starts else ()
+        tokens.note_expected_words(*words, *(("RETURN",) if starts and tokens.in_function else ()), *closing)
+        tokens.note_expected_words(starts_statement=starts)
         if tokens.is_at_end or _is_at_list_end(tokens):
             break
         if _skip_stray_closer(tokens):
@@ -68,7 +72,7 @@ def _is_at_list_end(tokens: TokenStream) -> bool:
     """Whether the stretch of statements ends with the next token."""
     token = tokens.current
     if token.kind is _NAME:
-        return not _starts_phrase(tokens) and _replace_misspelt_end(tokens)
+        return not (_starts_phrase(tokens) or starts_return(tokens)) and _replace_misspelt_end(tokens)
     if token.kind is not _KEYWORD:
         return False
     if token.key in tokens.vocabulary.block_ends:
@@ -143,11 +147,11 @@ def statement(tokens: TokenStream) -> tree.Statement:
 def _statement_from_name(tokens: TokenStream, after: Token) -> tree.Statement:
     """Read a statement that begins with a name."""
     token = tokens.current
-    if _starts_phrase(tokens):
+    if _starts_phrase(tokens) or starts_return(tokens):
         return tokens.rules[token.key](tokens)
     if after.key in ASSIGNMENT_SIGNS or after.key == "[":
         return tokens.rules["="](tokens)
-    if after.key == "(" and tokens.peek(2).kind is not TokenKind.STRING:
+    if after.key == "(" and (tokens.peek(2).kind is not TokenKind.STRING or tokens.standard is Standard.RLO_2):
         return tokens.rules["("](tokens)
     known = _is_known(tokens, token)
     foreign = not known and (token.key in FOREIGN_STATEMENTS or token.key in UNSUPPORTED_STATEMENTS)
@@ -265,7 +269,7 @@ def _statement_separator(tokens: TokenStream) -> None:
     token = tokens.current
     if tokens.accept(";") or tokens.is_at_statement_end:
         return
-    if token.kind is _NAME and _replace_misspelt_end(tokens):
+    if token.kind is _NAME and not starts_return(tokens) and _replace_misspelt_end(tokens):
         return
     if _starts_statement(tokens):
         text, here = "missing `;` between two statements", labels(token.span, "a new statement starts here")
@@ -281,7 +285,9 @@ def _starts_statement(tokens: TokenStream) -> bool:
         return token.key in (*tokens.vocabulary.statements, *tokens.vocabulary.headers, "BEGIN")
     if token.kind is not _NAME and token.kind is not _ARM:
         return False
-    if after.key in ASSIGNMENT_SIGNS or not tokens.is_on_same_line() or _starts_phrase(tokens):
+    if after.key in ASSIGNMENT_SIGNS or not tokens.is_on_same_line():
+        return True
+    if _starts_phrase(tokens) or starts_return(tokens):
         return True
     if after.key in ("(", "["):
         return after.key == "[" or token.key in tokens.procedures
@@ -290,9 +296,16 @@ def _starts_statement(tokens: TokenStream) -> bool:
 
 
 def _starts_phrase(tokens: TokenStream) -> bool:
-    """Whether two words stand here that start a statement together, though programs may use each as a name."""
+    """Whether a word starts a statement here by what stands behind it, though programs may use it as a name."""
     after = tokens.peek()
+    if after.kind is TokenKind.STRING:
+        return tokens.matches_word(*STATEMENTS_BEFORE_TEXT)
     return after.kind is _NAME and STATEMENT_PHRASES.get(tokens.current.key) == after.key
+
+
+def starts_return(tokens: TokenStream) -> bool:
+    """Whether RETURN stands here, which in a FUNCTION is a name only where it gets a value."""
+    return tokens.in_function and tokens.matches_word("RETURN") and tokens.peek().key not in (*ASSIGNMENT_SIGNS, "[")
 
 
 def _is_known(tokens: TokenStream, token: Token) -> bool:

@@ -7,7 +7,7 @@ from typing import Concatenate, NoReturn, ParamSpec, TypeAlias, TypeVar, Unpack
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Details, DiagnosticList, Fix, did_you_mean
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import VOCABULARIES, Standard, is_reserved_in_rlo_2_only
+from armwright.program.language.words import HEADERS_IN_CONTEXT, VOCABULARIES, Standard, is_reserved_in_rlo_2_only
 from armwright.program.syntax import tree
 from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -55,6 +55,7 @@ class TokenStream:
         procedures: the names of the procedures read so far.
         reported_missing: the words whose absence has been reported.
         enclosing_procedure: the key of the procedure that the position lies in; empty outside of all.
+        in_function: whether the position lies in the statements of a FUNCTION.
         recover_depth: how many TRYs the position lies in the second part of.
         assignment_target: the key of the variable that the statement gives a value; empty where it gives none.
         operand_context: what the expression is for that is being read, in the words of messages, and where.
@@ -85,6 +86,7 @@ class TokenStream:
         self.reported_missing: set[str] = set()
         self.enclosing_procedure = self.assignment_target = ""
         self.recover_depth = 0
+        self.in_function = False
         self.operand_context = ANY_VALUE
         self.expected: ExpectedTokens | None = None
         # How much was wrong in front of the last token; what is looked for after a mistake there is guessed.
@@ -150,6 +152,27 @@ class TokenStream:
         if self.is_at_end:
             self.note_expected_words(*keys)
         return None
+
+    def matches_word(self, *words: str) -> bool:
+        """Whether the next token is one of these words, which are reserved nowhere; RLO-83 has none of them."""
+        token = self.current
+        is_word = token.key in words and (token.kind is _NAME or token.kind is _KEYWORD)
+        return is_word and self.standard is Standard.RLO_2
+
+    def accept_word(self, *words: str) -> Token | None:
+        """Read the next token if it is one of these words, which are reserved nowhere: here it is a keyword."""
+        if self.matches_word(*words):
+            # Whoever goes through the tokens behind the parser, such as the formatter, knows it for one too.
+            self.current.kind = _KEYWORD
+            return self.take()
+        if self.is_at_end:
+            self.note_expected_words(*words)
+        return None
+
+    @property
+    def starts_header_in_context(self) -> bool:
+        """Whether two words stand here of which the first starts a part in front of BEGIN."""
+        return self.matches_word(*HEADERS_IN_CONTEXT) and self.peek().kind is _NAME
 
     def note_expected_words(
         self, *keys: str, starts_statement: bool = False, present_clauses: frozenset[str] = frozenset()

@@ -317,6 +317,13 @@ class Halt(Node):
 
 
 @attrs.frozen
+class Return(Node):
+    """``RETURN value``."""
+
+    value: Expression
+
+
+@attrs.frozen
 class Call(Node):
     """``name (arguments)``."""
 
@@ -325,7 +332,7 @@ class Call(Node):
 
 
 ControlStatement: TypeAlias = (
-    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Call
+    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Return | Call
 )
 
 
@@ -333,10 +340,23 @@ ControlStatement: TypeAlias = (
 class Print(Node):
     """``PRINT (values and strings)``."""
 
-    items: tuple[Expression | String, ...]
+    items: tuple[Expression, ...]
 
 
-Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | Print | Poison
+@attrs.frozen
+class Log(Node):
+    """``LOG "name" (values)``."""
+
+    name: String
+    items: tuple[Expression, ...]
+
+
+OutputStatement: TypeAlias = Print | Log
+
+# What a FUNCTION is made of: it works out a value, and does nothing else.
+FUNCTION_STATEMENTS = (Assign, Block, If, While, Repeat, For, Return, Poison)
+
+Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | OutputStatement | Poison
 
 
 @attrs.frozen
@@ -346,7 +366,7 @@ class TypeName(Node):
     Attributes:
         span: where it stands.
         text: as written.
-        key: SCALAR, TRANS, FRAME or EVENT; None when it is none of them.
+        key: such as SCALAR; None when it is none of the types.
         sizes: of an array, one for each index; empty for a single thing.
     """
 
@@ -357,10 +377,19 @@ class TypeName(Node):
 
 @attrs.frozen
 class Declaration(Node):
-    """``a, b : TYPE``, in a VAR part or as a parameter."""
+    """``a, b : TYPE``, in a VAR part or as a parameter; ``mode`` is IN or INOUT where the program says which."""
 
     names: tuple[Name, ...]
     type: TypeName
+    mode: str = ""
+
+
+@attrs.frozen
+class Constant(Node):
+    """``name = value`` behind CONST."""
+
+    name: Name
+    value: Expression
 
 
 @attrs.frozen
@@ -379,16 +408,20 @@ class Units(Node):
 
 @attrs.frozen
 class Procedure(Node):
-    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis."""
+    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis.
+
+    A FUNCTION has the type of its ``result`` behind the parenthesis.
+    """
 
     head: Span
     name: Name
     parameters: tuple[Declaration, ...]
     declarations: tuple[Declaration, ...]
     body: Block
+    result: TypeName | None = None
 
 
-Header: TypeAlias = Declaration | Import | Units | Procedure
+Header: TypeAlias = Declaration | Constant | Import | Units | Procedure
 
 
 @attrs.frozen
@@ -397,7 +430,7 @@ class Program(Node):
 
     Attributes:
         span: from the first token to the last.
-        headers: declarations, imports, units and procedures, in the order of the text.
+        headers: declarations, constants, imports, units and procedures, in the order of the text.
         statements: in order.
         end: the closing END.
     """
@@ -410,6 +443,11 @@ class Program(Node):
     def declarations(self) -> tuple[Declaration, ...]:
         """The declarations of the VAR parts."""
         return tuple(header for header in self.headers if isinstance(header, Declaration))
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """The constants."""
+        return tuple(header for header in self.headers if isinstance(header, Constant))
 
     @property
     def procedures(self) -> tuple[Procedure, ...]:

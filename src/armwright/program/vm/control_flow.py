@@ -6,98 +6,25 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from armwright.program.bytecode.instructions import Instruction, Op
-from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
+from armwright.program.vm.calls import CALLS, leave_activation
 from armwright.program.vm.contact import contact_report, record_contact, stop_arm
 from armwright.program.vm.machine import Handler, Machine, RunError, jump_target
-from armwright.program.vm.move import halt_motion, release_locks
-from armwright.program.vm.process import Activation, EarlyEnd, PendingEffect, Process, TryBlock, WaitReason
-from armwright.program.vm.synchronization import abandon_wait, lock, signal, unlock, wait
+from armwright.program.vm.move import halt_motion
+from armwright.program.vm.process import (
+    Activation,
+    EarlyEnd,
+    PendingEffect,
+    Process,
+    TryBlock,
+    WaitReason,
+)
+from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
 
-# A last pass that rounding would leave out is made.
+# A time this part of a period behind a tick is on it.
 _ROUNDING = 1e-9
 # The longest pause; more is a slip of units [s].
 _MAX_PAUSE = 1e6
-
-
-def _jump(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    process.pc = jump_target(step, 0)
-
-
-def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
-    if not machine.read(process, step.operands[0], step.span):
-        process.pc = jump_target(step, 1)
-
-
-def _for(machine: Machine, process: Process, step: Instruction) -> None:
-    variable, count, *bounds = step.operands[:5]
-    passes = machine.read_number(process, count, step.span)
-    first, last, increment = (machine.read_number(process, bound, step.span) for bound in bounds)
-    if increment == 0:
-        raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
-    if passes > (last - first) / increment + _ROUNDING:
-        process.pc = jump_target(step, 5)
-        return
-    machine.write(process, variable, first + passes * increment, step.span)
-    machine.write(process, count, passes + 1, step.span)
-
-
-# ---- procedures ----------------------------------------------------------------------------------------------------
-
-
-def _call(machine: Machine, process: Process, step: Instruction) -> None:
-    name = str(step.operands[0])
-    procedure = machine.code.procedures[name]
-    if len(process.stack) > machine.limits.depth:
-        text = f"procedure calls are nested more than {machine.limits.depth} deep"
-        raise machine.error(process, "E505", text, step.span, f"`{machine.spelling(name)}` is called once more")
-    machine.state.activation_count += 1
-    bindings, local_slots = {}, []
-    for key, kind in procedure.types.items():
-        slot = f"{key}'{machine.state.activation_count}"
-        if key in procedure.parameters:
-            operand = step.operands[1 + procedure.parameters.index(key)]
-            by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
-            argument = None if by_value else machine.variable_name(process, operand)
-            if argument is not None:
-                bindings[key] = argument
-                continue
-            if by_value:
-                read = machine.read_number if kind.kind is VariableKind.SCALAR else machine.read_pose
-                machine.state.values[slot] = read(process, operand, step.span)
-            else:
-                X_WF = machine.read_pose(process, operand, step.span)
-                machine.replace_tree(machine.state.tree.set_pose(slot, X_WF), slot, step.span)
-        bindings[key] = slot
-        machine.state.types[slot] = kind
-        local_slots.append(slot)
-    activation = Activation("procedure", name, bindings, return_address=process.pc, call_span=step.span)
-    activation.local_slots, activation.lock_count = tuple(local_slots), len(process.locks)
-    process.stack.append(activation)
-    process.pc = procedure.start
-
-
-def _return(machine: Machine, process: Process, step: Instruction) -> None:
-    process.pc = process.activation.return_address
-    _leave_activation(machine, process, step.span)
-
-
-def _leave_activation(machine: Machine, process: Process, span: Span) -> None:
-    """Leave the present activation: its variables are gone, its locks given back."""
-    activation = process.stack.pop()
-    release_locks(machine, process, activation.lock_count)
-    for slot in activation.local_slots:
-        kind = machine.state.types.pop(slot)
-        elements = [name for name in machine.state.tree if name.startswith(f"{slot}[")] if kind.sizes else []
-        for name in (slot, *elements):
-            if kind.kind is VariableKind.FRAME and name in machine.state.tree:
-                machine.replace_tree(machine.state.tree.without(name), name, span)
-                machine.state.pose_origins.pop(name, None)
-                for hand in machine.state.hands.values():
-                    hand.forget_frame(name)
-        for name in [value for value in machine.state.values if value == slot or value.startswith(f"{slot}[")]:
-            del machine.state.values[name]
-        machine.state.events.pop(slot, None)
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------
@@ -203,7 +130,7 @@ def _halt(machine: Machine, process: Process, step: Instruction) -> None:
         finish_program(machine, process, step.span, "HALT")
         return
     while process.activation.kind != "action":
-        _leave_activation(machine, process, step.span)
+        leave_activation(machine, process, step.span)
     halt_motion(machine, process, step)
 
 
@@ -303,7 +230,7 @@ def _unwind_to_recovery(machine: Machine, process: Process, span: Span) -> TryBl
                 return try_block
         if len(process.stack) == 1:
             return None
-        _leave_activation(machine, process, span)
+        leave_activation(machine, process, span)
 
 
 def _cancel_branch(machine: Machine, process: Process, span: Span) -> int:
@@ -317,11 +244,7 @@ def _cancel_branch(machine: Machine, process: Process, span: Span) -> int:
 
 
 HANDLERS: Mapping[Op, Handler] = {
-    Op.JMP: _jump,
-    Op.JZ: _jump_if_not,
-    Op.FOR: _for,
-    Op.CALL: _call,
-    Op.RET: _return,
+    **CALLS,
     Op.FORK: _fork,
     Op.JOIN: _join,
     Op.QUIT: _quit,

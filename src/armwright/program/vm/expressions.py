@@ -3,15 +3,18 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from armwright.program.bytecode.instructions import Constant, Instruction, Op
-from armwright.program.vm.machine import Handler, Machine, jump_target
+from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand
+from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
 from armwright.program.vm.process import ElementReference, Process
+from armwright.program.vm.value_text import value_text
 
 # Components of a wrench: forces, then moments.
 _COMPONENTS = {"X": 0, "Y": 1, "Z": 2, "MX": 3, "MY": 4, "MZ": 5}
 # An index this near to a whole number is that number.
 _INTEGER_TOLERANCE = 1e-9
+# Texts are messages: of longer ones a loop has made too much.
+_MAX_TEXT = 1000
 
 
 def _load(machine: Machine, process: Process, step: Instruction) -> None:
@@ -61,6 +64,28 @@ def _force(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], value, step.span)
 
 
+def joined_text(machine: Machine, process: Process, step: Instruction, operands: Sequence[Operand]) -> str:
+    """Return values and texts as PRINT writes them: with a blank between each two."""
+    units = machine.code.units
+    return " ".join(value_text(machine.read(process, operand, step.span), units) for operand in operands)
+
+
+def _text(machine: Machine, process: Process, step: Instruction) -> None:
+    text = joined_text(machine, process, step, step.operands[1:])
+    if len(text) > _MAX_TEXT:
+        message = f"a text of {len(text)} characters is too long"
+        raise machine.error(process, "E240", message, step.span, f"more than {_MAX_TEXT}")
+    machine.write(process, step.operands[0], text, step.span)
+
+
+def _truth(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], step.operands[1] == "TRUE", step.span)
+
+
+def _time(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], machine.now, step.span)
+
+
 HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
@@ -68,15 +93,7 @@ HANDLERS: Mapping[Op, Handler] = {
     **dict.fromkeys(OPERATIONS, _compute),
     Op.ELEM: _element,
     Op.FORCE: _force,
+    Op.TIME: _time,
+    Op.TEXT: _text,
+    Op.LOADB: _truth,
 }
-
-
-def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[Instruction], index: int = 0) -> None:
-    """Do instructions that only give values, up to RET or the last: those of a condition or an expression."""
-    while index < len(steps) and (step := steps[index]).op is not Op.RET:
-        index += 1
-        if step.op is Op.JZ:
-            # AND and OR jump forwards; nothing else in an expression jumps.
-            index = index if machine.read(process, step.operands[0], step.span) else jump_target(step, 1)
-        else:
-            HANDLERS[step.op](machine, process, step)

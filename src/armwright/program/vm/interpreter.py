@@ -189,11 +189,7 @@ def _advance(machine: Machine, process: Process) -> None:
         advance_motion(machine, process)
         return
     step = machine.code.instructions[process.pc]
-    machine.state.idle_steps += 1
-    if machine.state.idle_steps > machine.limits.steps:
-        text = f"the program has executed {machine.limits.steps} steps, and no time has passed"
-        help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
-        raise machine.error(process, "E504", text, step.span, "it is running this statement", helps=[help_])
+    machine.count_step(process, step.span)
     process.pc += 1
     HANDLERS[step.op](machine, process, step)
 

@@ -16,7 +16,7 @@ from armwright.cell.hardware import Hardware, SimulatedHardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand
+from armwright.program.bytecode.instructions import Code, Instruction, JumpTarget, Operand, Text
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
@@ -169,6 +169,8 @@ class Machine:
             RunError: a variable has no value yet.
         """
         if not isinstance(operand, str):
+            if isinstance(operand, Text):
+                return operand.value
             assert isinstance(operand, float | int)  # noqa: S101 - nothing else has a value
             return float(operand)
         name = self.variable_name(process, operand)
@@ -367,6 +369,18 @@ class Machine:
                 data=data or {},
             )
         )
+
+    def count_step(self, process: Process, span: Span) -> None:
+        """Count an instruction.
+
+        Raises:
+            RunError: there have been too many without any time going by.
+        """
+        self.state.idle_steps += 1
+        if self.state.idle_steps > self.limits.steps:
+            text = f"the program has executed {self.limits.steps} steps, and no time has passed"
+            help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
+            raise self.error(process, "E504", text, span, "it is running this statement", helps=[help_])
 
     # ---- errors ----------------------------------------------------------------------------------------------------
 

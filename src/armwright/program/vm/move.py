@@ -18,6 +18,7 @@ from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
+from armwright.program.vm.calls import evaluate_instructions
 from armwright.program.vm.collisions import check_late_stage, checked_stages
 from armwright.program.vm.contact import (
     contact_report,
@@ -27,12 +28,12 @@ from armwright.program.vm.contact import (
     stop_arm,
     update_depth_alarm,
 )
-from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.process import EarlyEnd, Guard, Motion, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
+from armwright.program.vm.synchronization import release_locks
 from armwright.spatial.poses import inverse
 
 # A pose this many times farther than the arm reaches was probably typed in another unit.
@@ -124,17 +125,6 @@ def _finish_enclosing_move(machine: Machine, process: Process, motion: Motion, s
     # When the arm is at rest the same instruction is looked at again.
     process.pc -= 1
     return False
-
-
-def release_locks(machine: Machine, process: Process, keep_count: int) -> None:
-    """Give back the locks that a process took after its first ``keep_count``; whoever waits for one looks again."""
-    for name in process.locks[keep_count:]:
-        if name not in process.locks[:keep_count]:
-            machine.state.locks.pop(name, None)
-    del process.locks[keep_count:]
-    for other in machine.state.processes:
-        if other.waiting and other.waiting.kind == "locks":
-            other.waiting, other.wake_tick = None, machine.state.ticks
 
 
 # ---- planning ------------------------------------------------------------------------------------------------------

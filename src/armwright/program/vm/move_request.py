@@ -3,7 +3,7 @@
 from itertools import takewhile
 from typing import NamedTuple
 
-from armwright.program.bytecode.instructions import Form, Instruction, Op, Operand
+from armwright.program.bytecode.instructions import Code, Form, Instruction, Op, Operand
 from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 from armwright.program.vm.machine import Machine, jump_target
@@ -11,6 +11,8 @@ from armwright.program.vm.process import Guard, Process
 
 # The longest MOVE; more is a slip of units [s].
 _MAX_DURATION = 1e6
+# What may take a pose: of the operations in a condition all others take numbers.
+_READS_POSES = {op for op in Op if set("Pvtx") & set(op.signature.partition("=")[2] or op.signature)}
 
 
 class Goal(NamedTuple):
@@ -110,13 +112,25 @@ def _clause_value(machine: Machine, process: Process, part: Instruction) -> floa
     return value * machine.code.units.metres if part.op is Op.MVBLD else value
 
 
+def _operations(code: Code, condition: int) -> set[Op]:
+    """Return the operations of a condition, those of the functions that it calls among them."""
+    ops: set[Op] = set()
+    starts = [condition]
+    for start in starts:
+        for step in takewhile(lambda step: step.op not in (Op.RET, Op.NORET), code.instructions[start:]):
+            ops.add(step.op)
+            if step.op is Op.CALLF and (called := code.procedures[str(step.operands[1])].start) not in starts:
+                starts.append(called)
+    return ops
+
+
 def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, action = jump_target(part, 0), jump_target(part, 2)
-    ops = {step.op for step in takewhile(lambda step: step.op is not Op.RET, machine.code.instructions[condition:])}
+    ops = _operations(machine.code, condition)
     return Guard(
         condition=condition,
         result=str(part.operands[1]),
         action=action,
-        reads_pose=not ops.isdisjoint((Op.DIST, Op.COPY, Op.MUL, Op.INV)),
+        reads_pose=not ops.isdisjoint(_READS_POSES),
         reads_force=Op.FORCE in ops,
     )

@@ -40,8 +40,8 @@ class ElementReference:
     name: str
 
 
-# Numbers, truth values, poses and steps (4, 4), elements.
-Value: TypeAlias = float | bool | Array | ElementReference
+# Numbers, truth values, texts, poses and steps (4, 4), elements.
+Value: TypeAlias = float | bool | str | Array | ElementReference
 
 
 @attrs.frozen
@@ -76,6 +76,7 @@ class Activation:
         call_span: the statement that called it; of an action, its MOVE.
         local_slots: where its own variables are kept, gone with it.
         lock_count: how many locks the process held when it began.
+        result: where the value of a function goes.
     """
 
     kind: Literal["main", "procedure", "condition", "action"]
@@ -88,6 +89,7 @@ class Activation:
     call_span: Span | None = None
     local_slots: tuple[str, ...] = ()
     lock_count: int = 0
+    result: str = ""
 
     def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> Activation:
         """Return the activation of a condition or an action, which has the names of this one."""

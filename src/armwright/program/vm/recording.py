@@ -16,6 +16,7 @@ from armwright.cell.model import Cell, CellArm
 from armwright.cell.observations import MeasuredStream, Observations, Picture
 from armwright.cell.part_poses import PartTrack
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.files.csv_text import csv_line
 from armwright.motion.efforts import without_rounding
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
@@ -36,7 +37,9 @@ _TICK_TOLERANCE = 1e-6
 # Of statements that take time, and take effect at its end.
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
 _MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP"]
-EffectKind: TypeAlias = TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "LOCK", "PRINT", "ERROR", "END"]
+EffectKind: TypeAlias = (
+    TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "LOCK", "PRINT", "LOG", "ERROR", "END"]
+)
 # Not of the trace: assignments, locks and the end of the text.
 _SILENT = ("PLACE", "LOCK", "END")
 
@@ -359,6 +362,28 @@ def motion_csv_lines(streams: Iterable[Stream], sampled: slice = slice(None)) ->
     """
     tables = [(s.arm, s.t, {"q": s.q, "qd": s.qd, "qdd": s.qdd, "tau": s.tau}) for s in streams]
     return _csv_lines(tables, sampled)
+
+
+def log_csv_lines(effects: Iterable[Effect]) -> dict[str, list[str]]:
+    """Return the lines of what LOG has written, by the name of the log: the time [s], then the values.
+
+    Args:
+        effects: of a run, in order.
+    """
+    logs: dict[str, list[str]] = {}
+    spelling: dict[str, str] = {}
+    for effect in effects:
+        if effect.kind == "LOG":
+            name = spelling.setdefault(str(effect.data["log"]).lower(), str(effect.data["log"]))
+            lines = logs.setdefault(name, [f"t,{effect.data['titles']}\n"])
+            lines.append(f"{effect.t0:.12g},{csv_line(map(_csv_value, effect.data['values']))}\n")
+    return logs
+
+
+def _csv_value(value: bool | float | str) -> str:  # noqa: FBT001 - what is written
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else f"{value:.12g}"
 
 
 def measured_csv_lines(streams: Iterable[MeasuredStream], sampled: slice = slice(None)) -> Iterable[str]:

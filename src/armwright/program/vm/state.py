@@ -72,7 +72,7 @@ class MachineState:
     trees: list[tuple[float, FrameTree]]
     program: Process
     processes: list[Process]
-    values: dict[str, float | Array] = attrs.field(factory=dict)
+    values: dict[str, float | bool | str | Array] = attrs.field(factory=dict)
     events: dict[str, int] = attrs.field(factory=dict)
     locks: dict[str, Process] = attrs.field(factory=dict)
     owners: dict[str, list[Process]] = attrs.field(factory=dict)

@@ -3,7 +3,6 @@
 from armwright.program.bytecode.instructions import Instruction
 from armwright.program.language.diagnostic import Label
 from armwright.program.vm.machine import Machine, RunError
-from armwright.program.vm.move import release_locks
 from armwright.program.vm.process import Process, WaitReason
 from armwright.program.vm.recording import EffectKind
 
@@ -46,6 +45,17 @@ def unlock(machine: Machine, process: Process, step: Instruction) -> None:
     """Give locks back."""
     names = {machine.resolve_name(process, operand) for operand in step.operands}
     release_locks(machine, process, len(process.locks) - len(names))
+
+
+def release_locks(machine: Machine, process: Process, keep_count: int) -> None:
+    """Give back the locks that a process took after its first ``keep_count``; whoever waits for one looks again."""
+    for name in process.locks[keep_count:]:
+        if name not in process.locks[:keep_count]:
+            machine.state.locks.pop(name, None)
+    del process.locks[keep_count:]
+    for other in machine.state.processes:
+        if other.waiting and other.waiting.kind == "locks":
+            other.waiting, other.wake_tick = None, machine.state.ticks
 
 
 def abandon_wait(machine: Machine, process: Process) -> None:

@@ -18,9 +18,11 @@ def value_text(value: Value, units: UnitSystem) -> str:
     """Return a value for people: numbers to six digits, poses with lengths in the units of the program.
 
     Args:
-        value: a number, a truth value, a pose or a step.
+        value: a number, a truth value, a text, a pose or a step.
         units: of the program.
     """
+    if isinstance(value, str):
+        return value
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float | int):
