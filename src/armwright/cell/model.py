@@ -11,6 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.cell.outputs import Encoders, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
@@ -55,6 +56,9 @@ class CellArm:
         plant: the arm that stands in such a cell, where it is another than ``arm``, which its controller believes in.
         sensors: what its controller knows of its joints there.
         force_sensor: between the arm and its tool there.
+        controller: name of the convention of its controller; None for that which lists the arm.
+        gripper_output: the output that closes its gripper; None where none is named.
+        encoders: of its drives; None where nothing is known of them.
     """
 
     arm: Arm
@@ -67,6 +71,9 @@ class CellArm:
     plant: Arm | None = None
     sensors: Sensors = attrs.field(factory=Sensors)
     force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
+    controller: str | None = None
+    gripper_output: Output | None = None
+    encoders: Encoders | None = None
 
     @property
     def gripper_or_usual(self) -> Gripper:
@@ -127,6 +134,7 @@ class Cell:
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the devices that can be operated; None allows any name.
+        outputs: of the controller, by the device that each switches.
         contact: plane with which arms and what they carry come into contact.
         alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
@@ -156,6 +164,7 @@ class Cell:
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
     devices: frozenset[str] | None = None
+    outputs: Mapping[str, Output] = attrs.field(factory=dict)
     contact: ContactPlane = attrs.field(factory=ContactPlane)
     alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1

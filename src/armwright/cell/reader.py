@@ -19,6 +19,7 @@ from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, r
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarget
 from armwright.cell.names import arm_name
+from armwright.cell.outputs_reader import read_devices, read_encoders, read_output
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.cell.trials_reader import read_trials
@@ -96,6 +97,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
+    devices = read_devices(top.table("devices"))
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -113,7 +115,8 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
-        devices=_read_devices(top.table("devices")) if "devices" in top else None,
+        devices=frozenset(devices) if "devices" in top else None,
+        outputs={name: output for name, output in devices.items() if output is not None},
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
@@ -227,8 +230,11 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         plant=_with_tool(read_plant(table.table("plant"), arm, folder), table) if "plant" in table else None,
         sensors=read_sensors(table.table("sensors")),
         force_sensor=read_force_sensor(table.table("force")),
+        controller=table.text("controller") if "controller" in table else None,
+        gripper_output=read_output(table.table("gripper_output")),
+        encoders=read_encoders(table.table("encoders"), arm.n) if "encoders" in table else None,
     )
-    table.allow("gripper", "plant")
+    table.allow("gripper", "plant", "controller", "encoders")
     table.refuse_unknown_keys()
     return result
 
@@ -329,12 +335,3 @@ def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list
         path[parent] = None
         parent = frames[parent].parent
     return list(path)
-
-
-def _read_devices(table: Table) -> frozenset[str]:
-    refuse_too_many(table, "entries")
-    devices: set[str] = set()
-    for key in table:
-        devices.add(read_name(table, key, devices))
-        table.table(key).refuse_unknown_keys()
-    return frozenset(devices)
