@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.outputs import Encoders, Output
+from armwright.cell.outputs import Controller, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
@@ -56,9 +56,7 @@ class CellArm:
         plant: the arm that stands in such a cell, where it is another than ``arm``, which its controller believes in.
         sensors: what its controller knows of its joints there.
         force_sensor: between the arm and its tool there.
-        controller: name of the convention of its controller; None for that which lists the arm.
-        gripper_output: the output that closes its gripper; None where none is named.
-        encoders: of its drives; None where nothing is known of them.
+        controller: what is known of its real controller.
     """
 
     arm: Arm
@@ -71,9 +69,7 @@ class CellArm:
     plant: Arm | None = None
     sensors: Sensors = attrs.field(factory=Sensors)
     force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
-    controller: str | None = None
-    gripper_output: Output | None = None
-    encoders: Encoders | None = None
+    controller: Controller = attrs.field(factory=Controller)
 
     @property
     def gripper_or_usual(self) -> Gripper:

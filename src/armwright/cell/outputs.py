@@ -1,4 +1,4 @@
-"""What the controller and the drives of a real cell are connected to: outputs of devices, encoders of joints."""
+"""Real controllers: how they count joints, and the outputs and encoders that they are connected to."""
 
 import attrs
 
@@ -33,3 +33,18 @@ class Encoders:
     offset: Array = attrs.field(converter=read_only)
     signs: Array = attrs.field(converter=read_only)
     period: float | None = None
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Controller:
+    """What is known of the real controller of an arm.
+
+    Attributes:
+        convention: name of how it counts joints and where its frames stand; None for that which lists the arm.
+        gripper_output: the output that closes the gripper; None where none is named.
+        encoders: of the drives; None where nothing is known of them.
+    """
+
+    convention: str | None = None
+    gripper_output: Output | None = None
+    encoders: Encoders | None = None

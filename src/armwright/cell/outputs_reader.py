@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from armwright.cell.entries import read_name, refuse_too_many
-from armwright.cell.outputs import Encoders, Output
+from armwright.cell.outputs import Controller, Encoders, Output
 from armwright.files.document import Table
 
 # No controller has more outputs; names of signals are identifiers of RAPID.
@@ -37,7 +37,17 @@ def read_devices(table: Table) -> dict[str, Output | None]:
     return devices
 
 
-def read_encoders(table: Table, joints: int) -> Encoders:
+def read_controller(table: Table, joints: int) -> Controller:
+    """Read what the table of an arm with so many joints says of its real controller."""
+    table.allow("controller", "encoders")
+    return Controller(
+        convention=table.text("controller") if "controller" in table else None,
+        gripper_output=read_output(table.table("gripper_output")),
+        encoders=_read_encoders(table.table("encoders"), joints) if "encoders" in table else None,
+    )
+
+
+def _read_encoders(table: Table, joints: int) -> Encoders:
     """Read the encoders of an arm with so many joints."""
     counts = table.vector("counts", joints)
     if (counts <= 0).any() or (counts > _MAX_COUNTS).any():

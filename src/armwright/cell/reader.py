@@ -19,7 +19,7 @@ from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, r
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarget
 from armwright.cell.names import arm_name
-from armwright.cell.outputs_reader import read_devices, read_encoders, read_output
+from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.cell.trials_reader import read_trials
@@ -230,11 +230,9 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         plant=_with_tool(read_plant(table.table("plant"), arm, folder), table) if "plant" in table else None,
         sensors=read_sensors(table.table("sensors")),
         force_sensor=read_force_sensor(table.table("force")),
-        controller=table.text("controller") if "controller" in table else None,
-        gripper_output=read_output(table.table("gripper_output")),
-        encoders=read_encoders(table.table("encoders"), arm.n) if "encoders" in table else None,
+        controller=read_controller(table, arm.n),
     )
-    table.allow("gripper", "plant", "controller", "encoders")
+    table.allow("gripper", "plant")
     table.refuse_unknown_keys()
     return result
 

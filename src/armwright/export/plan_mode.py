@@ -153,7 +153,7 @@ def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
     """
     placed, source = recording.cell.arms[arm_name], recording.code.source
     span = recording.stages[0].span if recording.stages else Span(0, 0)
-    convention = find_convention(placed.arm, placed.controller)
+    convention = find_convention(placed.arm, placed.controller.convention)
     if convention is None:
         text = f"no convention says how the controller of '{placed.arm.name}' counts its joints"
         known = ", ".join(sorted(conventions()))
@@ -197,7 +197,10 @@ def _switching(effect: Effect, recording: Recording) -> list[Statement]:
         output, where = cell.outputs.get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
     else:
         device, on = str(effect.arm), effect.kind == "GRASP"
-        output, where = cell.arms[device].gripper_output, f"`[arms.{device}]` `gripper_output = {{ output = 1 }}`"
+        output, where = (
+            cell.arms[device].controller.gripper_output,
+            f"`[arms.{device}]` `gripper_output = {{ output = 1 }}`",
+        )
         if "TO" in words:
             text = f"an output switches the gripper of {device}, and cannot open it to a width"
             raise refusal(source, "E616", text, effect.span, "a width is asked for", helps=[f"write `OPEN {device}`"])

@@ -65,7 +65,7 @@ def compare_counts(text: str, recording: Recording, arm_name: str) -> tuple[Comp
         CheckError: it is no such table.
     """
     placed = recording.cell.arms[arm_name]
-    arm, encoders = placed.arm, placed.encoders
+    arm, encoders = placed.arm, placed.controller.encoders
     first, *_ = text.split("\n", 1)
     words = first.split()
     if words[:2] != ["#", "period"] or encoders is None:

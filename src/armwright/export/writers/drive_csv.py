@@ -28,21 +28,22 @@ def write(recording: Recording, arm_name: str) -> list[ControllerFile]:
     placed, source = recording.cell.arms[arm_name], recording.code.source
     mine = [stage for stage in recording.stages if stage.arm == arm_name]
     span = mine[0].span if mine else Span(0, 0)
-    if placed.encoders is None:
+    encoders = placed.controller.encoders
+    if encoders is None:
         text = f"the cell file does not say how the drives of {arm_name} count"
         helps = [f"write `[arms.{arm_name}.encoders]` with `counts`, `offset`, `signs` and `period_ms`"]
         raise refusal(source, "E618", text, span, f"{arm_name} moves here", helps=helps)
-    period = placed.encoders.period or recording.cell.period
+    period = encoders.period or recording.cell.period
     motion = arm_motion(recording, arm_name)
     ticks = np.arange(math.ceil(motion.duration / period - _TICK_TOLERANCE) + 1)
-    counts = _counts(motion(ticks * period), placed.encoders, placed.arm.revolute)
+    counts = _counts(motion(ticks * period), encoders, placed.arm.revolute)
     if ((counts < _SMALLEST) | (counts > _LARGEST)).any():
         row, joint = (int(x) for x in np.argwhere((counts < _SMALLEST) | (counts > _LARGEST))[0])
         time = row * period
         at = next((stage.span for stage in mine if stage.t1 >= time), span)
         text = f"joint {joint + 1} of {arm_name} comes to {counts[row, joint]:,.0f} counts, which 32 bits do not hold"
         raise refusal(source, "E618", text, at, "on this MOVE", helps=["set another `offset` of its encoder"])
-    half = float((np.where(placed.arm.revolute, 2 * np.pi, 1.0) / placed.encoders.counts).max()) / 2
+    half = float((np.where(placed.arm.revolute, 2 * np.pi, 1.0) / encoders.counts).max()) / 2
     notes = (
         f"positions are whole counts: they are off by up to half a count, {half:.2g} rad or m",
         "outputs and texts are not part of the table: events.json has them with their times",

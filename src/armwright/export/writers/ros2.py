@@ -24,7 +24,7 @@ _NANO = 1_000_000_000
 def write(recording: Recording, arm_name: str) -> list[ControllerFile]:
     """Return the trajectory of an arm, and the goal of an action with it."""
     placed = recording.cell.arms[arm_name]
-    convention = find_convention(placed.arm, placed.controller)
+    convention = find_convention(placed.arm, placed.controller.convention)
     own = [joint.name for joint in placed.arm.joints]
     notes = [
         "controllers that interpolate without velocities and accelerations leave the path",
