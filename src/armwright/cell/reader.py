@@ -97,7 +97,6 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
-    devices = read_devices(top.table("devices"))
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -115,8 +114,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
-        devices=frozenset(devices) if "devices" in top else None,
-        outputs={name: output for name, output in devices.items() if output is not None},
+        devices=read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,

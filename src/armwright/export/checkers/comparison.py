@@ -247,7 +247,7 @@ class _Comparing:
         motion, goal = statement.stage.motion, statement.stage.stage.goal
         poses = statement.poses if goal is None else goal.poses
         corners = [self._model.pose(self._q[None])[0, :3, 3]]
-        zone, line = 0.0, 0
+        zone, last_zone, line = 0.0, 0.0, 0
         for pose in poses:
             action = self._next(actions, LineAction)
             if action is None:
@@ -261,9 +261,9 @@ class _Comparing:
             if action.duration is not None:
                 self.times.add(abs(action.duration - statement.duration), action.line)
             corners.append(X[:3, 3])
-            zone, line = max(zone, action.zone), action.line
+            zone, last_zone, line = max(zone, action.zone), action.zone, action.line
         self.joints.add(float(np.abs(self._q - motion(motion.duration)).max()), line)
-        self.statements.add(int(action.zone > 0), line)
+        self.statements.add(int(last_zone > 0), line)
         # The planned path is where the straight lines of the file are, but for what was certified and for corners.
         points = self._model.pose(motion(np.linspace(0.0, motion.duration, _LOOKS)))[:, :3, 3]
         far = float(_distances(points, np.array(corners)).max())
