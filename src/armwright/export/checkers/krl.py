@@ -20,6 +20,10 @@ from armwright.export.checkers.orientations import from_zyx_degrees
 
 _FRAME, _AXES = tuple("XYZABC"), tuple(f"A{i}" for i in range(1, 7))
 
+# What is set once: where frames are counted from, and that the program goes on while a text is shown.
+_FIXED = {"$BASE": "$NULLFRAME", "$IPO_MODE": "#BASE", "$LOOP_CONT": "TRUE"}
+_SETTINGS = ("$VEL.CP", "$VEL.ORI1", "$VEL.ORI2", "$ACC.CP", "$APO.CDIS", "$APO.CPTP")
+
 
 def read(text: str) -> ReadProgram:
     """Return what a program in KRL does.
@@ -54,6 +58,9 @@ class _Reader:
                 self._assign(node, line)
             case "call":
                 self._call(node, line)
+            case "wait_for":
+                if node.children[0].data != "call" or _target(node.children[0].children[0], line) != "STRCLEAR":
+                    raise CheckError(f"line {line}: the checker knows WAIT FOR StrClear alone")
             case "wait":
                 self.actions.append(WaitAction(line=line, seconds=number(node.children[0], line)))
             case other:
@@ -82,19 +89,15 @@ class _Reader:
         target, value = node.children
         name = _target(target, line)
         if name.startswith("$OUT["):
-            state = _target(value.children[0], line).upper() if value.data == "name" else ""
-            if state not in ("TRUE", "FALSE"):
-                raise CheckError(f"line {line}: expected TRUE or FALSE")
-            self.actions.append(OutputAction(line=line, output=int(name[5:-1]), on=state == "TRUE"))
+            self.actions.append(OutputAction(line=line, output=int(name[5:-1]), on=_truth(value, line)))
+        elif name == "$LOOP_MSG[]":
+            self.actions.append(TextAction(line=line, text=str(value.children[0])[1:-1]))
         elif name == "$TOOL":
             self.tool = _frame(fields(str(value.children[0])))
-        elif name == "$BASE":
-            if value.data != "name" or _target(value.children[0], line) != "$NULLFRAME":
-                raise CheckError(f"line {line}: expected the null frame")
-        elif name == "$IPO_MODE":
-            if str(value.children[0]) != "#BASE":
-                raise CheckError(f"line {line}: expected #BASE")
-        elif name in ("$VEL.CP", "$VEL.ORI1", "$VEL.ORI2", "$ACC.CP", "$APO.CDIS", "$APO.CPTP"):
+        elif name in _FIXED:
+            if _word(value, line) != _FIXED[name]:
+                raise CheckError(f"line {line}: expected {_FIXED[name]}")
+        elif name in _SETTINGS:
             self._settings[name] = number(value, line)
         else:
             raise CheckError(f"line {line}: the checker does not know {name}")
@@ -107,8 +110,6 @@ class _Reader:
                 pass
             case "BAS", ["#VEL_PTP", _]:
                 self._percent = number(values[1], line)
-            case "MSGNOTIFY", [shown]:
-                self.actions.append(TextAction(line=line, text=shown[1:-1]))
             case _:
                 raise CheckError(f"line {line}: the checker does not know {name}")
 
@@ -118,8 +119,23 @@ def _target(node: Any, line: int) -> str:
     first, *others = node.children
     text = str(first).upper()
     for other in others:
-        text += f"[{number(other, line):g}]" if hasattr(other, "data") else f".{str(other).upper()}"
+        if other is None:
+            text += "[]"
+        else:
+            text += f"[{number(other, line):g}]" if hasattr(other, "data") else f".{str(other).upper()}"
     return text
+
+
+def _word(node: Any, line: int) -> str:
+    """Return a variable, or a word of an enumeration."""
+    return str(node.children[0]) if node.data == "enum" else _target(node.children[0], line)
+
+
+def _truth(node: Any, line: int) -> bool:
+    word = _word(node, line) if node.data == "name" else ""
+    if word not in ("TRUE", "FALSE"):
+        raise CheckError(f"line {line}: expected TRUE or FALSE")
+    return word == "TRUE"
 
 
 def _frame(values: dict[str, float]) -> Array:

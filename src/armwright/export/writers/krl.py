@@ -78,7 +78,9 @@ def _lines(statement: Statement, program: ControllerProgram, said: dict[str, str
             yield f"WAIT SEC {decimal(seconds, 4)}"
         case Say(text=text):
             for line in plain_lines(text, _REPLACED):
-                yield f'MsgNotify("{line}")'
+                yield "WAIT FOR StrClear($LOOP_MSG[])"
+                yield "$LOOP_CONT=TRUE"
+                yield f'$LOOP_MSG[]="{line}"'
 
 
 def _straight(statement: MoveLines, program: ControllerProgram, said: dict[str, str]) -> Iterator[str]:

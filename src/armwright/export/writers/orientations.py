@@ -29,10 +29,11 @@ def quaternion(R: Array) -> tuple[float, float, float, float]:
         q[1 + i] = 1 + 2 * m[i][i] - trace
         q[1 + j] = m[i][j] + m[j][i]
         q[1 + k] = m[i][k] + m[k][i]
-    norm = math.copysign(math.sqrt(sum(x * x for x in q)), q[0])
-    if q[0] == 0.0:
-        # Of the two quaternions of a half turn, the one whose first component that is not zero is positive.
-        norm = math.copysign(norm, next(x for x in q if x))
+    norm = math.sqrt(sum(x * x for x in q))
+    if abs(q[0]) < _NOTHING * norm:
+        # Both quaternions of a half turn are as good: the one whose first component that counts is positive.
+        q[0] = 0.0
+    norm = math.copysign(norm, next(x for x in q if abs(x) >= _NOTHING * norm))
     return q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm
 
 

@@ -8,8 +8,9 @@ _KRL = """
 and anin anout axis b_and b_exor b_not b_or bas bool brake bwdstart c_dis c_ori c_ptp c_vel case cast_from cast_to char
 circ circ_rel const continue ddecl decl def defdat deffct default delay digin digout distance do e6axis e6pos else end
 enddat endfct endfold endfor endif endloop endswitch endwhile enum exit exor ext extfct false fold for frame global goto
-halt if import int interrupt is lin lin_rel loop maximum minimum msgnotify not on or path pos prio ptp ptp_rel public
-pulse real repeat return sec signal slin spl spline sptp struc switch then to trigger true until wait when while
+halt if import int interrupt is lin lin_rel loop maximum minimum not on or path pos prio ptp ptp_rel public
+pulse real repeat return sec signal slin spl spline sptp strclear struc switch then to trigger true until wait when
+while
 """
 _RAPID = """
 alias and backward case confl connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord
