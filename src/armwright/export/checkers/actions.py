@@ -39,6 +39,7 @@ class LineAction:
         configuration: words of the controller for the posture at the end, by name; empty where it has none.
         duration: that is asked for [s]; None where a speed is.
         speed: of the tool point that is asked for [m/s].
+        turn_speed: of the rotation that is asked for [rad/s]; None where the language has none.
         zone: how far from the end the next motion may begin [m].
     """
 
@@ -47,6 +48,7 @@ class LineAction:
     configuration: Mapping[str, int] = attrs.field(factory=dict)
     duration: float | None = None
     speed: float | None = None
+    turn_speed: float | None = None
     zone: float = 0.0
 
 

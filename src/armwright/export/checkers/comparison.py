@@ -41,6 +41,8 @@ _STEP, _TURN, _MOST_STEPS, _FEWEST_STEPS = 0.02, 0.1, 64, 6
 _NEWTON, _NEAR = 8, 1e-11
 # Directions in which the arm is singular, as a part of its largest singular value.
 _SINGULAR = 1e-7
+# A way of the tool point that takes no time to speak of [m].
+_SHORT = 1e-6
 # Points of a stage at which its path is compared.
 _LOOKS = 17
 
@@ -254,8 +256,8 @@ class _Comparing:
                 return
             X = self._program.mapped.X_BC @ action.X
             self._poses(X, pose, action.line)
-            path = self._model.follow(self._q, X)
-            self._speed(path, action, float(np.linalg.norm(X[:3, 3] - corners[-1])))
+            begin, path = self._model.pose(self._q[None])[0], self._model.follow(self._q, X)
+            self._speed(path, action, begin, X)
             self._q = path[-1]
             self._configuration(action)
             if action.duration is not None:
@@ -276,16 +278,16 @@ class _Comparing:
             wrong = sum(value not in words[word] for word, value in action.configuration.items())
             self.postures.add(wrong, action.line)
 
-    def _speed(self, path: Array, action: LineAction, length: float) -> None:
-        """Compare the joint speeds along a line at a constant speed of the tool with the limits."""
-        steps = np.abs(np.diff(path, axis=0)) * (len(path) - 1)
+    def _speed(self, path: Array, action: LineAction, begin: Array, end: Array) -> None:
+        """Compare the joint speeds along a line, the tool moving evenly in the time it is given, with the limits."""
+        length, turn = float(np.linalg.norm(end[:3, 3] - begin[:3, 3])), angle_apart(begin[:3, :3], end[:3, :3])
         if action.duration is not None:
             time = action.duration
-        elif action.speed and length:
-            time = length / action.speed
         else:
-            return
+            parts = [(length, action.speed, _SHORT), (turn, action.turn_speed, _ANGLE)]
+            time = max((way / speed for way, speed, least in parts if speed and way > least), default=0.0)
         if time:
+            steps = np.abs(np.diff(path, axis=0)) * (len(path) - 1)
             self.speeds.add(float((steps / time / self._model.limits).max()), action.line)
 
     def _knots(self, statement: MoveKnots, actions: Iterator[Action]) -> None:

@@ -79,9 +79,11 @@ class _Reader:
         elif kind.upper() == "LIN" and tuple(values) == (*_FRAME, "S", "T"):
             words = {word: int(values[word]) for word in "ST"}
             zone = self._settings.get("$APO.CDIS", 0.0) * 1e-3 if passes else 0.0
-            speed = self._settings.get("$VEL.CP")
+            speed, turn = self._settings.get("$VEL.CP"), float(np.deg2rad(self._settings.get("$VEL.ORI1", 0.0)))
             X = _frame(values)
-            self.actions.append(LineAction(line=line, X=X, configuration=words, speed=speed, zone=zone))
+            self.actions.append(
+                LineAction(line=line, X=X, configuration=words, speed=speed, turn_speed=turn, zone=zone)
+            )
         else:
             raise CheckError(f"line {line}: the checker knows PTP to axes, and LIN to a frame with S and T")
 

@@ -86,13 +86,16 @@ def _straight(arguments: list[Any], values: list[Any], tools: dict[str, Array], 
     words = vector(_numbers(configuration, line), 4, line)
     _known_tool(values[3], tools, line)
     timed = _time(arguments[1])
-    speed = None if timed is not None else vector(_numbers(values[1], line), 4, line)[0] * 1e-3
+    speed = turn = None
+    if timed is None:
+        speed, turn, *_ = vector(_numbers(values[1], line), 4, line) * (1e-3, np.pi / 180, 1.0, 1.0)
     return LineAction(
         line=line,
         X=X,
         configuration={word: int(value) for word, value in zip(_WORDS, words, strict=True)},
         duration=timed,
         speed=speed,
+        turn_speed=turn,
         zone=_zone(values[2], line),
     )
 
