@@ -19,6 +19,8 @@ from armwright.export.checkers.grammar import number, parse, vector
 from armwright.export.checkers.orientations import from_quaternion
 
 _WORDS = ("cf1", "cf4", "cf6", "cfx")
+# How far the square of the length of a quaternion may be off one.
+_NORM = 1e-6
 # Of zone data: the part for the tool point.
 _PATH_ZONE = 1
 
@@ -140,5 +142,8 @@ def _frame(node: Any, line: int) -> Array:
 def _frame_of(position: Any, orientation: Any, line: int) -> Array:
     X = np.eye(4)
     X[:3, 3] = vector(_numbers(position, line), 3, line) / 1000.0
-    X[:3, :3] = from_quaternion(vector(_numbers(orientation, line), 4, line))
+    quaternion = vector(_numbers(orientation, line), 4, line)
+    if abs(quaternion @ quaternion - 1.0) > _NORM:
+        raise CheckError(f"line {line}: expected a quaternion of length one")
+    X[:3, :3] = from_quaternion(quaternion)
     return X
