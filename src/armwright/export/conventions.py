@@ -73,6 +73,7 @@ class ControllerArm:
         zeros: (n,) joint positions of the arm where those of the controller are zero [rad].
         X_BC: (4, 4) base frame of the controller, seen from that of the arm.
         X_CT: (4, 4) tool of the arm, seen from the flange frame of the controller.
+        front: (3,) where the arm looks, seen from its first link: the x axis of its base where the joints are zero.
     """
 
     arm: Arm
@@ -81,6 +82,7 @@ class ControllerArm:
     zeros: Array = attrs.field(converter=read_only)
     X_BC: Array = attrs.field(converter=read_only)
     X_CT: Array = attrs.field(converter=read_only)
+    front: Array = attrs.field(converter=read_only)
 
     def joints(self, q: Array) -> Array:
         """Return joint positions (..., n) [rad] as the controller counts them."""
@@ -143,7 +145,13 @@ def controller_arm(arm: Arm, convention: Convention) -> ControllerArm:
     # The flange frame of the controller stands at the origin of the last frame.
     X_FC = homogeneous(frames[_JOINTS, :3, :3].T @ convention.flange, np.zeros(3))
     return ControllerArm(
-        arm=arm, convention=convention, signs=signs, zeros=zeros, X_BC=X_BC, X_CT=inverse(X_FC) @ arm.tool
+        arm=arm,
+        convention=convention,
+        signs=signs,
+        zeros=zeros,
+        X_BC=X_BC,
+        X_CT=inverse(X_FC) @ arm.tool,
+        front=frames[1, 0, :3],
     )
 
 

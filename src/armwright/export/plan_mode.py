@@ -226,13 +226,19 @@ def _motion(stage: RunStage, recording: Recording, solver: Solver) -> list[State
     end = motion(motion.duration)
     if not np.ptp(motion(np.linspace(0.0, motion.duration, _LOOKS)), axis=0).any():
         return [Wait(span=span, seconds=motion.duration)]
-    speed_part = float((motion.peaks(1) / solver.arm.limits.speed).max())
     if planned.kind == "PTP" and stage.path is None:
-        return [MoveJoints(span=span, stage=stage, q=end, duration=motion.duration, speed_part=speed_part)]
+        part = _speed_part(stage, solver)
+        return [MoveJoints(span=span, stage=stage, q=end, duration=motion.duration, speed_part=part)]
     if planned.kind in ("LINE", "BLEND") and planned.detour is None and planned.goal is not None:
         return [_lines(stage, planned.goal.poses, planned.goal.blend, solver)]
     times = path_knots(motion, solver, recording.cell.deviation)
-    return [MoveKnots(span=span, stage=stage, times=times, q=motion(times), speed_part=speed_part)]
+    part = _speed_part(stage, solver)
+    return [MoveKnots(span=span, stage=stage, times=times, q=motion(times), speed_part=part)]
+
+
+def _speed_part(stage: RunStage, solver: Solver) -> float:
+    """Return the largest part of the speed limit of a joint that a stage takes."""
+    return float((stage.motion.peaks(1) / solver.arm.limits.speed).max())
 
 
 def _lines(stage: RunStage, poses: Array, blend: float | None, solver: Solver) -> MoveLines:

@@ -111,9 +111,9 @@ def _units(arm: Arm, encoders: Encoders) -> Array:
 def _plan(times: Array, stages: Sequence[RunStage], start: Array) -> Array:
     """Return the joint positions (k, n) of a run at times (k,), stage by stage."""
     q = np.tile(np.asarray(start, dtype=float), (len(times), 1))
-    for stage in stages:
-        later = times >= stage.t0
-        q[later] = stage.motion(times[later] - stage.t0)
+    firsts = np.searchsorted(times, [stage.t0 for stage in stages])
+    for stage, first, last in zip(stages, firsts, [*firsts[1:], len(times)], strict=True):
+        q[first:last] = stage.motion(times[first:last] - stage.t0)
     return q
 
 

@@ -1,8 +1,14 @@
 """Rotations out of what controllers write, by elementary rotations and products of quaternions alone."""
 
+import math
+from typing import TypeAlias
+
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike
+
+_Quaternion: TypeAlias = tuple[float, float, float, float]
+_UNITS: tuple[_Quaternion, ...] = ((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
 def turn(axis: int, angle: float) -> Array:
@@ -25,11 +31,12 @@ def from_quaternion(numbers: ArrayLike) -> Array:
 
     Each column is what q v q* makes of a unit vector.
     """
-    q = np.asarray(numbers, dtype=float)
-    q = q / np.sqrt(q @ q)
-    back = q * (1.0, -1.0, -1.0, -1.0)
-    columns = [_product(_product(q, np.insert(np.eye(3)[i], 0, 0.0)), back)[1:] for i in range(3)]
-    return np.stack(columns, axis=-1)
+    w, x, y, z = np.asarray(numbers, dtype=float).tolist()
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    q = (w / size, x / size, y / size, z / size)
+    back = (q[0], -q[1], -q[2], -q[3])
+    columns = [_product(_product(q, unit), back)[1:] for unit in _UNITS]
+    return np.array(columns).T
 
 
 def from_rotation_vector(numbers: ArrayLike) -> Array:
@@ -41,7 +48,7 @@ def from_rotation_vector(numbers: ArrayLike) -> Array:
     vector = np.asarray(numbers, dtype=float)
     angle = float(np.sqrt(vector @ vector))
     part = np.sinc(angle / (2 * np.pi)) / 2
-    return from_quaternion(np.insert(part * vector, 0, np.cos(angle / 2)))
+    return from_quaternion([np.cos(angle / 2), *(part * vector)])
 
 
 def angle_apart(R: Array, S: Array) -> float:
@@ -49,7 +56,12 @@ def angle_apart(R: Array, S: Array) -> float:
     return float(2.0 * np.arcsin(min(1.0, np.sqrt(((R - S) ** 2).sum() / 8.0))))
 
 
-def _product(p: Array, q: Array) -> Array:
+def _product(p: _Quaternion, q: _Quaternion) -> _Quaternion:
     """Return the product of two quaternions w, x, y, z."""
-    (a, *u), (b, *v) = p, q
-    return np.array([a * b - np.dot(u, v), *(a * np.array(v) + b * np.array(u) + np.cross(u, v))])
+    (a, b, c, d), (w, x, y, z) = p, q
+    return (
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    )

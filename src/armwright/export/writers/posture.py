@@ -29,10 +29,9 @@ class Posture(NamedTuple):
 
 def posture(mapped: ControllerArm, q: Array) -> Posture:
     """Return the posture of an arm at joint positions (6,)."""
-    arm = mapped.arm
-    zero, frames = link_poses(arm, mapped.zeros), link_poses(arm, q)
+    frames = link_poses(mapped.arm, q)
     wrist = _common_point(frames[3], frames[4])
-    front = frames[1, :3, :3] @ zero[1, :3, :3].T @ np.array((1.0, 0.0, 0.0))
+    front = frames[1, :3, :3] @ mapped.front
     upper, fore = frames[2, :3, 3] - frames[1, :3, 3], wrist - frames[2, :3, 3]
     axis = frames[2, :3, 2] * mapped.signs[2]
     upper, fore = upper - axis * (axis @ upper), fore - axis * (axis @ fore)
