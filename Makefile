@@ -56,6 +56,9 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/around.rlo --cell examples/puma_cell.toml --around via -o out/around
 	$(BIN)/armwright run examples/palletise.rlo --cell examples/stanford_cell.toml -o out/palletise
 	$(BIN)/armwright run examples/weld.rlo --cell examples/stanford_cell.toml -o out/weld
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[export]'
+	$(BIN)/armwright export urscript examples/palletise.rlo --cell examples/ur5_cell.toml -o out/ur5
+	$(BIN)/armwright export ros2 examples/weld.rlo --cell examples/ur5_cell.toml -o out/ros2
 	$(BIN)/armwright run examples/peg.rlo --cell examples/peg_cell.toml -o out/peg
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways

@@ -29,6 +29,7 @@ ALL = (
     "motion_knots",
     "motion_online",
     "language",
+    "export",
     "play",
     "calibration",
     "studio",

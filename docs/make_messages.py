@@ -20,6 +20,7 @@ explain` lists all codes. The language is described in [language.md](language.md
 | E3.. | frames: their poses and parents | the compiler; at run time where the compiler cannot decide |
 | E4.. | motion: what an arm cannot do | at run time, before the MOVE begins |
 | E5.. | deadlocks, and programs that do not end | the compiler where it can decide, otherwise at run time |
+| E6.. | what cannot be exported to a controller | `armwright export` |
 | R6.. | devices and cameras; mishaps in cells with physics | the compiler if the cell is known, otherwise at run time |
 | W... | allowed, but probably not intended | both; a program with warnings runs |
 | L3.. | style: closed grippers, unused names | the compiler; these are warnings too |
@@ -30,9 +31,10 @@ mistake is reported once; errors that follow from it are not reported.
 
 Comments at the beginning of a program below state how it is checked: `// std=83` and `// strict` are options of \
 `armwright check`; `// cell: arms ARM_1` describes the cell against which the program is checked, and `// import:` the \
-contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of seven small \
+contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of eight small \
 cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), above a table (`table`), above parts \
-(`parts`) and above a very light one (`sheet`), a PUMA 560 (`puma`) and a UR5 (`ur5`); `// physics` simulates it with \
+(`parts`) and above a very light one (`sheet`), a PUMA 560 (`puma`), a UR5 (`ur5`), and two of them with \
+outputs and encoders (`controller`); `// export krl` exports the motion of the run; `// physics` simulates it with \
 servos, contact and grippers; `// limits:`, `// around:` and `// effort:` give the options and limits of the run.
 """
 

@@ -1,6 +1,6 @@
 """The model of a cell: arms on their bases, frames, answers of the camera, devices, contact plane."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Literal, TypeAlias
 
 import attrs
@@ -11,6 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.cell.outputs import Controller, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
@@ -29,6 +30,10 @@ def _as_configuration(value: ArrayLike) -> Array:
 
 def _as_joint_target(value: ArrayLike) -> Array:
     return read_only(floats(value, "q"))
+
+
+def _as_devices(value: Collection[str] | None) -> Mapping[str, Output | None] | None:
+    return value if value is None or isinstance(value, Mapping) else dict.fromkeys(value)
 
 
 def _as_gravity(value: ArrayLike) -> Array:
@@ -55,6 +60,7 @@ class CellArm:
         plant: the arm that stands in such a cell, where it is another than ``arm``, which its controller believes in.
         sensors: what its controller knows of its joints there.
         force_sensor: between the arm and its tool there.
+        controller: what is known of its real controller.
     """
 
     arm: Arm
@@ -67,6 +73,7 @@ class CellArm:
     plant: Arm | None = None
     sensors: Sensors = attrs.field(factory=Sensors)
     force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
+    controller: Controller = attrs.field(factory=Controller)
 
     @property
     def gripper_or_usual(self) -> Gripper:
@@ -126,7 +133,8 @@ class Cell:
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
-        devices: names of the devices that can be operated; None allows any name.
+        devices: that can be operated, by name, with the output of a controller that switches each, as far as it is
+            known; None allows any name.
         contact: plane with which arms and what they carry come into contact.
         alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
@@ -155,7 +163,7 @@ class Cell:
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
-    devices: frozenset[str] | None = None
+    devices: Mapping[str, Output | None] | None = attrs.field(default=None, converter=_as_devices)
     contact: ContactPlane = attrs.field(factory=ContactPlane)
     alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1

@@ -19,6 +19,7 @@ from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, r
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarget
 from armwright.cell.names import arm_name
+from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.cell.trials_reader import read_trials
@@ -113,7 +114,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
-        devices=_read_devices(top.table("devices")) if "devices" in top else None,
+        devices=read_devices(top.table("devices")) if "devices" in top else None,
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
@@ -227,6 +228,7 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         plant=_with_tool(read_plant(table.table("plant"), arm, folder), table) if "plant" in table else None,
         sensors=read_sensors(table.table("sensors")),
         force_sensor=read_force_sensor(table.table("force")),
+        controller=read_controller(table, arm.n),
     )
     table.allow("gripper", "plant")
     table.refuse_unknown_keys()
@@ -329,12 +331,3 @@ def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list
         path[parent] = None
         parent = frames[parent].parent
     return list(path)
-
-
-def _read_devices(table: Table) -> frozenset[str]:
-    refuse_too_many(table, "entries")
-    devices: set[str] = set()
-    for key in table:
-        devices.add(read_name(table, key, devices))
-        table.table(key).refuse_unknown_keys()
-    return frozenset(devices)

@@ -45,7 +45,7 @@ def explain(
     import attrs
 
     from armwright.cli.terminal import console as clean_console
-    from armwright.program.diagnostics.examples import diagnose_example
+    from armwright.export.examples import diagnose_example
     from armwright.program.diagnostics.index import find_page
     from armwright.program.language.diagnostic import to_json
     from armwright.program.language.source import Source

@@ -113,6 +113,7 @@ class PlannedStage:
         obstacle: what stopped the straight line; of a SPLINE what kept the arm from rounding its corners, so that it
             stops at every frame; None where there is nothing of the kind.
         detour: the detour, and its price; None where there is no obstacle, and of a SPLINE.
+        goal: what it was planned for.
     """
 
     kind: StageKind
@@ -123,6 +124,7 @@ class PlannedStage:
     slowed: str = ""
     obstacle: Obstacle | None = None
     detour: Detour | None = None
+    goal: StageGoal | None = None
 
 
 class StageError(ArmwrightError, ValueError):
@@ -189,7 +191,8 @@ def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, num
     errors: list[StageError] = []
     for stage in _candidates(arm, q, goals[number], manner, number):
         try:
-            return [stage, *_plan(arm, stage.trajectory(stage.trajectory.duration), goals, manner, number + 1)]
+            following = _plan(arm, stage.trajectory(stage.trajectory.duration), goals, manner, number + 1)
+            return [attrs.evolve(stage, goal=goals[number]), *following]
         except StageError as error:
             errors.append(error)
     raise errors[0]

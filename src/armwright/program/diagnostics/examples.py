@@ -4,7 +4,7 @@
 program is checked against, and so do ``frames``, ``devices`` and ``visions``; ``// import: parts.toml: CUP, LID on
 CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the program run in a cell that comes with the pages, with
 ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command line; ``// effort: 60 in joint 2``
-makes a joint of its arms that weak.
+makes a joint of its arms that weak. ``// export urscript`` has its motion exported afterwards, by ``armwright.export``.
 """
 
 import re
@@ -25,6 +25,7 @@ from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
 from armwright.program.vm.interpreter import motion_warnings
 from armwright.program.vm.machine import Limits, RunError
+from armwright.program.vm.recording import Recording
 
 _CELLS = Path(__file__).parent / "pages" / "cells"
 _RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)
@@ -39,11 +40,14 @@ _OLD = re.compile(r"^// std=83$", re.MULTILINE)
 _STRICT = re.compile(r"^// strict$", re.MULTILINE)
 
 
-def diagnose_example(source: Source) -> tuple[Diagnostic, ...]:
-    """Return what is said of a program: by the translator and, where its comments have it run, on the way.
+def run_example(source: Source) -> tuple[tuple[Diagnostic, ...], Recording | None]:
+    """Return what is said of a program, by the translator and, where its comments have it run, on the way.
 
     Args:
         source: the program, with its comments.
+
+    Returns:
+        The diagnostics, and the run; None where there is none, or it did not come to its end.
     """
     cell = _run_cell(source.text)
     compiled = translate(
@@ -54,13 +58,13 @@ def diagnose_example(source: Source) -> tuple[Diagnostic, ...]:
         read_import=_import_reader(source.text),
     )
     if cell is None or compiled.code is None:
-        return compiled.diagnostics
+        return compiled.diagnostics, None
     limits = Limits(**{quantity: int(count) for quantity, count in _LIMIT.findall(source.text)})
     try:
         recording = run(compiled, limits=limits, hardware=_hardware(source.text))
     except RunError as error:
-        return (*compiled.diagnostics, error.diagnostic)
-    return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell))
+        return (*compiled.diagnostics, error.diagnostic), None
+    return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell)), recording
 
 
 def _run_cell(text: str) -> Cell | None:

@@ -17,6 +17,7 @@ _RANGES = {
     "E3": "Frames",
     "E4": "Motion",
     "E5": "Processes, and programs without end",
+    "E6": "Export to controllers",
     "R6": "Devices",
     "W": "Warnings",
     "L": "Style",

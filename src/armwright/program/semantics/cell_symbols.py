@@ -52,7 +52,7 @@ def known_cell(cell: Cell) -> KnownCell:
     return KnownCell(
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},
-        devices=cell.devices,
+        devices=None if cell.devices is None else frozenset(cell.devices),
         visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
     )

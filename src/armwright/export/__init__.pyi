@@ -1,0 +1,7 @@
+from .api import (
+    ExportedProgram as ExportedProgram,
+    export_program as export_program,
+    export_run as export_run,
+)
+from .proof import Comparison as Comparison, Proof as Proof
+from .refusals import ExportError as ExportError

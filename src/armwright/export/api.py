@@ -1,0 +1,141 @@
+"""Exporting what a program did in its cell: the files of a target, and the proof that they say the same."""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import get_args
+
+import attrs
+
+from armwright.cell.model import Cell
+from armwright.errors import CheckFailedError, InvalidValueError, one_of
+from armwright.export.checkers import krl as krl_checker, rapid as rapid_checker, urscript as urscript_checker
+from armwright.export.checkers.actions import CheckError
+from armwright.export.checkers.comparison import compare
+from armwright.export.checkers.joint_tables import compare_counts, compare_trajectory
+from armwright.export.conventions import Convention
+from armwright.export.events import events_file
+from armwright.export.plan_mode import fixed_notes, plan_statements, refuse_guards
+from armwright.export.proof import Comparison, Proof
+from armwright.export.targets import Target
+from armwright.export.writers import drive_csv, krl, rapid, ros2, urscript
+from armwright.program.api import Compilation, run
+from armwright.program.language.source import Source
+from armwright.program.vm.recording import Recording
+
+_LANGUAGES: Mapping[Target, tuple[ModuleType, ModuleType]] = {
+    "urscript": (urscript, urscript_checker),
+    "krl": (krl, krl_checker),
+    "rapid": (rapid, rapid_checker),
+}
+
+
+@attrs.frozen(kw_only=True)
+class ExportedProgram:
+    """Files for a controller, and the proof of what they say.
+
+    Attributes:
+        target: what they are for.
+        files: their texts by name; the proof is among them.
+        proof: what their checker found.
+    """
+
+    target: Target
+    files: Mapping[str, str]
+    proof: Proof
+
+
+def export_program(
+    target: Target, program: str | Path | Source | Compilation, cell: str | Path | Cell | None = None, *, name: str = ""
+) -> ExportedProgram:
+    """Run a program in its cell, and return the resulting motion for a controller.
+
+    Args:
+        target: ``ros2``, ``csv``, ``urscript``, ``krl`` or ``rapid``.
+        program: the path of its file, its text as a ``Source``, or a compiled program.
+        cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
+        name: of the exported program; that of the file without one.
+
+    Returns:
+        The files, with their proof; every difference from the plan is within what is allowed.
+
+    Raises:
+        UnknownNameError: there is no such target.
+        ProgramError: the program has errors.
+        RunError: it does not come to its end.
+        ExportError: it does what the target cannot repeat; the message has the line and the reason.
+        CheckFailedError: the files differ from the plan.
+        MissingExtraError: Lark is not installed, and the target needs it.
+
+    Example:
+        ``armwright.export.export_program("rapid", "pick.rlo", "cell.toml").files``
+    """
+    one_of("target", target, get_args(Target))
+    recording = run(program, cell)
+    return export_run(target, recording, name or Path(recording.code.source.name).stem)
+
+
+def export_run(target: Target, recording: Recording, name: str) -> ExportedProgram:
+    """Return the motion of a run for a controller; see ``export_program``.
+
+    Args:
+        target: ``ros2``, ``csv``, ``urscript``, ``krl`` or ``rapid``.
+        recording: a run that came to its end.
+        name: of the exported program.
+    """
+    one_of("target", target, get_args(Target))
+    if recording.failure is not None:
+        raise InvalidValueError(f"recording: the run failed: {recording.failure.diagnostic.message}")
+    try:
+        if target in _LANGUAGES:
+            files, proof = _language(target, recording, name)
+        else:
+            files, proof = _tables(target, recording)
+    except CheckError as error:
+        raise CheckFailedError(f"the exported program cannot be read back: {error}") from error
+    proof.require()
+    data = json.dumps({**proof.as_data(), "words": proof.lines()}, indent=2, ensure_ascii=False) + "\n"
+    return ExportedProgram(target=target, files={**files, "proof.json": data}, proof=proof)
+
+
+def _language(target: Target, recording: Recording, name: str) -> tuple[dict[str, str], Proof]:
+    """Return the file of a target that has a language, with its proof."""
+    writer, checker = _LANGUAGES[target]
+    program = plan_statements(recording, name)
+    written = writer.write(program)
+    proof = Proof(
+        target=target,
+        comparisons=compare(checker.read(written.text), program),
+        approximations=written.approximations,
+        notes=program.notes,
+        sources=tuple(_source_lines(program.mapped.convention)),
+    )
+    return {written.name: written.text}, proof
+
+
+def _tables(target: Target, recording: Recording) -> tuple[dict[str, str], Proof]:
+    """Return the files of a target that takes joint positions in time, one arm after the other."""
+    refuse_guards(recording)
+    files: dict[str, str] = {}
+    comparisons: list[Comparison] = []
+    approximations: dict[str, None] = {}
+    for arm in recording.cell.arms:
+        written = (ros2 if target == "ros2" else drive_csv).write(recording, arm)
+        files |= {file.name: file.text for file in written}
+        approximations |= dict.fromkeys(text for file in written for text in file.approximations)
+        check: Callable[..., tuple[Comparison, ...]] = compare_trajectory if target == "ros2" else compare_counts
+        found = check(*(file.text for file in written), recording, arm)
+        comparisons += [attrs.evolve(one, quantity=f"{arm}: {one.quantity}") for one in found]
+    proof = Proof(
+        target=target,
+        comparisons=tuple(comparisons),
+        approximations=tuple(approximations),
+        notes=tuple(fixed_notes(recording)),
+    )
+    return {**files, "events.json": events_file(recording)}, proof
+
+
+def _source_lines(convention: Convention) -> list[str]:
+    """Return the sources of a convention, one line each."""
+    return [f"{source.says}: {source.document}, {source.revision}" for source in convention.sources]

@@ -1,0 +1,99 @@
+"""What the program of a controller does, as a checker has read it."""
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+import attrs
+
+from armwright.arrays import Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class JointAction:
+    """All joints to positions.
+
+    Attributes:
+        line: of the file.
+        q: (n,) joint positions as the controller counts them [rad].
+        duration: that is asked for [s]; None where a speed is.
+        speed_part: part of the axis speeds of the controller, 1 for all; None where it is not said.
+        passes: whether the next motion may begin before the end.
+        streamed: whether it is one sample of a stream.
+    """
+
+    line: int
+    q: Array
+    duration: float | None = None
+    speed_part: float | None = None
+    passes: bool = False
+    streamed: bool = False
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class LineAction:
+    """The tool along a straight line.
+
+    Attributes:
+        line: of the file.
+        X: (4, 4) tool at the end, seen from the base frame of the controller.
+        configuration: words of the controller for the posture at the end, by name; empty where it has none.
+        duration: that is asked for [s]; None where a speed is.
+        speed: of the tool point that is asked for [m/s].
+        turn_speed: of the rotation that is asked for [rad/s]; None where the language has none.
+        zone: how far from the end the next motion may begin [m].
+    """
+
+    line: int
+    X: Array
+    configuration: Mapping[str, int] = attrs.field(factory=dict)
+    duration: float | None = None
+    speed: float | None = None
+    turn_speed: float | None = None
+    zone: float = 0.0
+
+
+@attrs.frozen(kw_only=True)
+class OutputAction:
+    """A digital output, by number or name, is switched."""
+
+    line: int
+    output: int | str
+    on: bool
+
+
+@attrs.frozen(kw_only=True)
+class WaitAction:
+    """Nothing happens for a time [s]."""
+
+    line: int
+    seconds: float
+
+
+@attrs.frozen(kw_only=True)
+class TextAction:
+    """A text is shown."""
+
+    line: int
+    text: str
+
+
+Action: TypeAlias = JointAction | LineAction | OutputAction | WaitAction | TextAction
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ReadProgram:
+    """A program of a controller.
+
+    Attributes:
+        name: it is called by.
+        X_CT: (4, 4) tool, seen from the flange frame of the controller.
+        actions: in order.
+    """
+
+    name: str
+    X_CT: Array
+    actions: tuple[Action, ...]
+
+
+class CheckError(ValueError):
+    """A file says what its checker does not understand; the text has the line."""

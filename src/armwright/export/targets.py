@@ -1,0 +1,5 @@
+"""What programs are exported to."""
+
+from typing import Literal, TypeAlias
+
+Target: TypeAlias = Literal["ros2", "csv", "urscript", "krl", "rapid"]

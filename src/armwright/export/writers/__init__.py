@@ -1,0 +1,1 @@
+"""Writers: the statements of a controller in its language."""

@@ -1,0 +1,21 @@
+"""Words that no program is called, in lower case: those of a language, and functions that exported programs call."""
+
+_URSCRIPT = """
+and break continue def elif else end enum false global halt if in join kill local mod movej movel movep not or p pass
+return run servoj set_standard_digital_out set_tcp sleep stopj sync textmsg thread true while xor
+"""
+_KRL = """
+and anin anout axis b_and b_exor b_not b_or bas bool brake bwdstart c_dis c_ori c_ptp c_vel case cast_from cast_to char
+circ circ_rel const continue ddecl decl def defdat deffct default delay digin digout distance do e6axis e6pos else end
+enddat endfct endfold endfor endif endloop endswitch endwhile enum exit exor ext extfct false fold for frame global goto
+halt if import int interrupt is lin lin_rel loop maximum minimum not on or path pos prio ptp ptp_rel public
+pulse real repeat return sec signal slin spl spline sptp strclear struc switch then to trigger true until wait when
+while
+"""
+_RAPID = """
+alias and backward case confl connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord
+endtest endtrap endwhile error exit false for from func goto if inout load0 local main mod module moveabsj movel
+nostepin not noview or pers proc raise readonly record retry return setdo step sysmodule test then to tool0 tool_1
+tpwrite trap true trynext undo var viewonly waittime while with wobj0 xor
+"""
+URSCRIPT, KRL, RAPID = frozenset(_URSCRIPT.split()), frozenset(_KRL.split()), frozenset(_RAPID.split())

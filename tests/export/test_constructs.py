@@ -1,0 +1,120 @@
+"""The table of constructs by targets in docs/export.md: each of its cells is what happens."""
+
+import re
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from armwright.cell import read_cell
+from armwright.export import ExportError, export_run
+from armwright.program import Recording, Source, run
+from export.cases import CELLS, ROOT
+
+PAGE = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+HEAD, _, *ROWS = PAGE[PAGE.index("| construct") :].partition("\n\n")[0].splitlines()
+TARGETS = [cell.strip() for cell in HEAD.strip("|").split("|")][1:]
+TABLE = {
+    cells[0].strip(): [cell.strip() for cell in cells[1:]] for cells in (row.strip("|").split("|") for row in ROWS)
+}
+
+DECLARED = """
+VAR a, b, c : FRAME ; n : SCALAR ;
+PROCEDURE away() ; BEGIN MOVE ARM_1 TO a * XYZ(0, 0, -0.05) END ;
+BEGIN
+  a = (1,0,0, 0,-1,0, 0,0,-1, 0.40, 0.15,0.20) ;
+  b = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.00,0.25) ;
+  c = (1,0,0, 0,-1,0, 0,0,-1, 0.40,-0.15,0.20) ;
+  MOVE ARM_1 TO a ;
+"""
+PROGRAMS = {
+    "MOVE, point to point": "MOVE ARM_1 TO b ;",
+    "STRAIGHTLY, APPROACH, DEPARTURE": "MOVE ARM_1 TO b STRAIGHTLY ; MOVE ARM_1 TO c WITH APPROACH = b ;",
+    "VIA": "MOVE ARM_1 TO c VIA (b) ;",
+    "VIA with BLEND": "MOVE ARM_1 TO c VIA (b), WITH BLEND = 0.02 ;",
+    "SPEED, DURATION": "MOVE ARM_1 TO b WITH SPEED = 30 ; MOVE ARM_1 TO c WITH DURATION = 3 ;",
+    "OPEN, GRASP": "OPEN ARM_1 ; GRASP ARM_1 ;",
+    "OPEN to a width": "OPEN ARM_1 TO 0.04 ;",
+    "OPERATE": "OPERATE LAMP ON ; OPERATE LAMP OFF ;",
+    "OPERATE of a device without an output": "OPERATE HORN ON ;",
+    "PAUSE": "PAUSE 0.5 ;",
+    "PRINT": 'PRINT ("n", 2) ;',
+    "IF, WHILE, FOR, procedures": "n = 2 ; IF n > 1 THEN away() ; WHILE n < 4 DO n = 4 ; FOR n = 1 TO 2 DO away() ;",
+    "AFFIX, UNFIX, frames": "AFFIX c TO b ; b = b * XYZ(0, 0, 0.02) ; MOVE ARM_1 TO c STRAIGHTLY ; UNFIX c FROM b ;",
+    "READ VISIONS": "READ VISIONS (c) ; MOVE ARM_1 TO c ;",
+    "TRY, RECOVER": "TRY MOVE ARM_1 TO a * XYZ(5, 0, 0) RECOVER MOVE ARM_1 TO b END ;",
+    "MOVE with ON": "MOVE ARM_1 TO c STRAIGHTLY, ON DIST(ARM_1, c) < 0.05 DO HALT ;",
+    "ZERO FORCE": "ZERO FORCE ARM_1 ;",
+    "COBEGIN, one thing after the other": "COBEGIN BEGIN MOVE ARM_1 TO b END ; BEGIN n = 2 END COEND ;",
+    "COBEGIN, two things at the same time": (
+        "COBEGIN BEGIN MOVE ARM_1 TO b END ; BEGIN PAUSE 0.1 ; OPERATE LAMP ON END COEND ;"
+    ),
+    "a second arm": "MOVE ARM_2 TO ARM_2 * XYZ(0, 0, 0.05) ;",
+}
+# Where a path is not a straight line after all; the straight way crosses the axis of joint 1.
+DETOUR = "detours of straight lines"
+
+
+def cell_text(name: str) -> str:
+    """A cell of the tests with a second arm, a device without an output, and an answer of the camera."""
+    text = CELLS[name].read_text(encoding="utf-8")
+    text = re.sub(r'model = "(\w+)\.toml"', lambda found: f'model = "{CELLS[name].parent}/{found[1]}.toml"', text)
+    model = re.search(r"model = .*", text)
+    convention = re.search(r"controller = .*", text)
+    assert model is not None
+    second = f"""
+[arms.ARM_2]
+{model[0]}
+{convention[0] if convention else ""}
+base = [1, 0, 0,  0, 1, 0,  0, 0, 1,   0.00, 3.00, 0.00]
+hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0.40, 3.00, 0.25]
+encoders = {{ counts = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6] }}
+"""
+    text = text.replace("[devices]", second + "\n[devices]\nHORN = {}")
+    return text.replace("[visions]", "[visions]\nC = [[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.42,-0.10, 0.20]]")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], Recording]:
+    """The run of the program of a construct in the cell of a target; targets of one cell share it."""
+    folder = tmp_path_factory.mktemp("constructs")
+
+    @cache
+    def in_cell(name: str, construct: str) -> Recording:
+        path = folder / f"{name}.toml"
+        path.write_text(cell_text(name), encoding="utf-8")
+        return run(Source("construct.rlo", f"{DECLARED}{PROGRAMS[construct]}\nEND."), read_cell(path))
+
+    return lambda target, construct: in_cell(target if target in CELLS else "urscript", construct)
+
+
+def test_the_table_is_whole() -> None:
+    """Every construct of the table has a program, and no other has; every target has a column."""
+    assert set(TABLE) == {*PROGRAMS, DETOUR}
+    assert TARGETS == ["urscript", "krl", "rapid", "ros2", "csv"]
+
+
+@pytest.mark.parametrize("construct", PROGRAMS)
+@pytest.mark.parametrize("target", TARGETS)
+def test_cells_of_the_table(target: str, construct: str, recorded: Callable[[str, str], Recording]) -> None:
+    """What the table says is in the files, or is the code of the refusal."""
+    said = TABLE[construct][TARGETS.index(target)]
+    recording = recorded(target, construct)
+    if said.startswith("E6"):
+        with pytest.raises(ExportError) as caught:
+            export_run(target, recording, "construct")
+        assert caught.value.diagnostic.code == said
+        assert str(caught.value).startswith("construct.rlo:9: ")
+        return
+    files = export_run(target, recording, "construct").files
+    texts = "\n".join(f"{name}\n{text}" for name, text in files.items() if name != "proof.json")
+
+    assert said.strip("`") in texts
+
+
+@pytest.mark.parametrize("construct", ["READ VISIONS", "TRY, RECOVER"])
+def test_what_is_fixed_is_said(construct: str, recorded: Callable[[str, str], Recording]) -> None:
+    """Answers of a camera and errors of the run are named in the proof, with their lines."""
+    notes = export_run("ros2", recorded("ros2", construct), "construct").proof.notes
+
+    assert [note[:8] for note in notes] == ["line 9: "]
