@@ -225,7 +225,7 @@ def test_nothing_known() -> None:
 
 
 def test_files_of_robots(tmp_path: Path, rng: np.random.Generator) -> None:
-    """What was identified of a UR5, tilts of parallel axes included, moves its last link alike in URDF and its files."""
+    """What was identified of a UR5, tilts of parallel axes included, moves its last link as in URDF."""
     arm = load_arm("ur5")
     chain = kinematic_chain(arm)
     q = configurations(rng, arm, 60)

@@ -109,9 +109,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None and output.exists() and Path(arm).exists() and output.samefile(arm):
         raise usage_error("-o", "expected another file than the input, which may hold more than an arm")
     if _is_cell(arm):
-        if calibration is not None:
-            raise usage_error("--calibration", f"expected an arm, got the cell '{arm}'")
-        done = _converted_cell(arm, to)
+        done = _converted_cell(arm, to, calibration)
     else:
         model_name = model or (None if calibration is None else arm)
         done = _converted_arm(to, _calibrated(_read(arm, base, tip, lock, package), calibration), model_name)
@@ -148,10 +146,12 @@ def _is_cell(path: str) -> bool:
     return path.lower().endswith((".toml", ".json")) and "arms" in Document.read(Path(path)).root
 
 
-def _converted_cell(path: str, to: Format) -> Converted:
+def _converted_cell(path: str, to: Format, calibration: Path | None) -> Converted:
     from armwright.cell.reader import read_cell
     from armwright.physics.mjcf import cell_mjcf
 
+    if calibration is not None:
+        raise usage_error("--calibration", f"expected an arm, got the cell '{path}'")
     if to is not Format.MJCF:
         raise usage_error("--to", f"'{path}' is a cell; expected mjcf, as the other formats hold a single arm")
     cell = read_cell(path)
