@@ -171,7 +171,7 @@ def test_other_commands_read_urdf() -> None:
     ("arguments", "status", "said"),
     [
         (("puma560",), 2, "-o: missing; specify the file to write, or the format as --to, which is printed then"),
-        (("puma560", "-o", "puma.yml"), 2, "expected a name that ends in .urdf, .xml, .toml, .conf or .yaml, got puma.yml"),
+        (("puma560", "-o", "puma.yml"), 2, "a name that ends in .urdf, .xml, .toml, .conf or .yaml, got puma.yml"),
         (("puma560", "--to", "mjfc"), 2, "'mjfc' is not one of 'urdf', 'mjcf', 'toml'"),
         (("ntu-3r", "-o", "ntu.xml"), 3, "specify mass and inertia of link 3"),
         ((CELL, "-o", "cell.urdf"), 2, "is a cell; expected mjcf, as the other formats hold a single arm"),
