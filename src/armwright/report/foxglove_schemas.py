@@ -77,6 +77,6 @@ SCHEMAS: Mapping[str, _Schema] = {
         "foxglove.CompressedImage": _object(
             timestamp=_TIME, frame_id=_TEXT, data={**_TEXT, "contentEncoding": "base64"}, format=_TEXT
         ),
-        "armwright.Run": _object(armwright=_TEXT, program=_TEXT, cell=_TEXT, arms=_object()),
+        "armwright.Run": _object(armwright=_TEXT, program=_TEXT, text=_TEXT, cell=_TEXT, arms=_object()),
     }.items()
 }

@@ -182,7 +182,7 @@ def run_log_content(recording: Recording) -> LogContent:
     animation, _ = run_animation(recording, _FRAMES_PER_SECOND, _MAX_INSTANTS)
     arms = {name: (arm.arm, arm.base) for name, arm in cell.arms.items()}
     return LogContent(
-        about=_about(arms, program=source.name, cell=cell.name),
+        about=_about(arms, program=source.name, text=source.text, cell=cell.name),
         tracks=[*planned, *measured],
         animation=animation,
         events=events,
