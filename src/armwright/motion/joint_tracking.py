@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -83,7 +83,7 @@ class JointTracking:
         if self.offset:
             notes.append(f"clocks brought together: the measurements begin {self.offset:+.4f} s later than the plan")
         if math.isfinite(self.common_delay):
-            notes.append(f"delay of all joints {self.common_delay * 1e3:.2f} ms")
+            notes.append(f"delay of all joints {self.common_delay * 1e3:z.2f} ms")
         if self.tool_error is not None:
             worst = int(self.tool_error.argmax())
             rms = math.sqrt(float((self.tool_error**2).mean()))
@@ -128,7 +128,7 @@ class JointTracking:
             if self.arm is not None:
                 # Of angles, thousandths of a radian say more than degrees.
                 unit, scale = ("mrad", 1e-3) if self.arm.joints[i].revolute else ("mm", 1e-3)
-            late = "at rest" if math.isnan(self.delay[i]) else f"{self.delay[i] * 1e3:.2f}"
+            late = "at rest" if math.isnan(self.delay[i]) else f"{self.delay[i] * 1e3:z.2f}"
             numbers = (self._largest()[i], _rms(error), float(error.mean()), float(self.left[i]))
             largest, rms, mean, left = (f"{value / scale:z.4g}" for value in numbers)
             rows.append((name, unit, largest, f"{self.t[np.abs(error).argmax()]:.3f}", rms, mean, late, left))
@@ -283,7 +283,9 @@ def _delay(t: Array, plan: Array, t_seen: Array, seen: Array, duration: float) -
         late = float(np.clip(late + step, -longest, longest))
         if abs(step) < 1e-9:
             break
-    return late, deviation, _rms(errors(late))
+    within = (t_seen - late >= t[0]) & (t_seen - late <= t[-1])
+    error = seen[within] - np.interp(t_seen[within] - late, t, plan)
+    return late, deviation, _rms(error - error.mean())
 
 
 def _best_shift(plan: JointStates, seen: JointStates) -> float:
@@ -333,12 +335,3 @@ def _rms(values: Array) -> float:
 
 def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def arm_descriptions(about: Mapping[str, Any]) -> dict[str, str]:
-    """Return the arm files that armwright put into a log, by the name of the arm; none of other logs."""
-    arms = about.get("arms", {})
-    found = arms.items() if isinstance(arms, Mapping) else ()
-    return {
-        str(name): arm["file"] for name, arm in found if isinstance(arm, Mapping) and isinstance(arm.get("file"), str)
-    }
