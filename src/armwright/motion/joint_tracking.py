@@ -124,7 +124,7 @@ class JointTracking:
         """Yield the table of the joints."""
         rows = []
         for i, name in enumerate(self.names):
-            error, unit, scale = self.error[:, i], "rad | m", 1.0
+            error, unit, scale = self.error[:, i], "rad, m", 1.0
             if self.arm is not None:
                 # Of angles, thousandths of a radian say more than degrees.
                 unit, scale = ("mrad", 1e-3) if self.arm.joints[i].revolute else ("mm", 1e-3)

@@ -17,9 +17,12 @@ from armwright.extras import import_extra
 from armwright.report.foxglove_schemas import SCHEMAS
 from armwright.report.log_content import (
     Entity,
+    Frames,
     JointsPayload,
     LogContent,
     LogEvent,
+    Payload,
+    Scene,
     SceneShape,
     Transform,
     timed_messages,
@@ -56,7 +59,7 @@ def mcap_log(content: LogContent) -> bytes:
     return file.getvalue()
 
 
-def _message(time: int, payload: object) -> tuple[str, Mapping[str, Any]]:
+def _message(time: int, payload: Payload) -> tuple[str, Mapping[str, Any]]:
     """Return the name of the schema of a message, and the message."""
     stamp = {"sec": time // 10**9, "nsec": time % 10**9}
     match payload:
@@ -77,11 +80,10 @@ def _message(time: int, payload: object) -> tuple[str, Mapping[str, Any]]:
             return "foxglove.CompressedImage", image
         case str():
             return "armwright.Run", json.loads(payload)
-        case [Transform(), *_]:
-            return "foxglove.FrameTransforms", {"transforms": [_transform(stamp, frame) for frame in payload]}
-        case _:
-            assert isinstance(payload, list)  # noqa: S101 - the rest of what a log holds
-            return "foxglove.SceneUpdate", {"deletions": [], "entities": [_entity(stamp, one) for one in payload]}
+        case Frames(transforms):
+            return "foxglove.FrameTransforms", {"transforms": [_transform(stamp, frame) for frame in transforms]}
+        case Scene(entities):
+            return "foxglove.SceneUpdate", {"deletions": [], "entities": [_entity(stamp, one) for one in entities]}
 
 
 def _joints(state: JointsPayload) -> list[dict[str, Any]]:

@@ -144,7 +144,19 @@ class Entity(NamedTuple):
     shapes: Sequence[SceneShape]
 
 
-Payload: TypeAlias = JointsPayload | list[Transform] | list[Entity] | LogEvent | Picture | str
+class Frames(NamedTuple):
+    """Poses of all frames at one time."""
+
+    transforms: Sequence[Transform]
+
+
+class Scene(NamedTuple):
+    """All that stands and moves in the world."""
+
+    entities: Sequence[Entity]
+
+
+Payload: TypeAlias = JointsPayload | Frames | Scene | LogEvent | Picture | str
 
 
 class TimedMessage(NamedTuple):
@@ -225,7 +237,7 @@ def timed_messages(content: LogContent) -> Iterator[TimedMessage]:
     start = _nanoseconds(float(content.animation.t[0]))
     first = [
         TimedMessage(start, "/armwright/run", content.about),
-        TimedMessage(start, "/scene", list(scene_entities(content.animation))),
+        TimedMessage(start, "/scene", Scene(list(scene_entities(content.animation)))),
     ]
     events = (TimedMessage(_nanoseconds(event.t), "/log", event) for event in content.events)
     pictures = (TimedMessage(_nanoseconds(one.time), f"/cameras/{one.camera}", one) for one in content.pictures)
@@ -269,7 +281,7 @@ def _transforms(animation: Animation) -> Iterator[TimedMessage]:
             if i >= track.first
         ]
         if frames:
-            yield TimedMessage(_nanoseconds(t), "/tf", frames)
+            yield TimedMessage(_nanoseconds(t), "/tf", Frames(frames))
 
 
 def _tracks(animation: Animation) -> Iterator[_Track]:

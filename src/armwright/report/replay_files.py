@@ -11,13 +11,14 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.model import Cell
+from armwright.errors import counted
 from armwright.files.logs.joint_log import JointStates
 from armwright.motion.joint_tracking import JointTracking
 from armwright.motion.replay import Replay, ReplayedMotion
 from armwright.report.animation import Animation
 from armwright.report.arm_figure import Placed, arm_figure
-from armwright.report.elements import Card, Tile, downloads, figures, tables
-from armwright.report.figures import Drawing, empty_figure, evenly_spaced, plain_label, svg_text
+from armwright.report.elements import Card, Tile, downloads, figures, table_cards
+from armwright.report.figures import Drawing, empty_figure, plain_label, svg_text
 from armwright.report.page import ArmRecord, Effect, MeasuredMotion, Message, RunPage, run_page
 from armwright.report.run_scene import fixture_bodies, placed_arms
 from armwright.report.shape_table import ShapeTable
@@ -28,8 +29,6 @@ from armwright.version import __version__
 
 # Instants of the animation per second, and at most.
 _FPS, _MAX_INSTANTS = 30.0, 1200
-# Points of a curve in a figure at most.
-_POINTS = 1500
 
 
 def replay_files(
@@ -45,7 +44,7 @@ def replay_files(
         cell: in which they moved, for the view; None without one.
     """
     drawn = [
-        Drawing(name, f"{motion.name}: planned and measured, and the error below", _joints_figure(motion))
+        Drawing(name, f"{motion.name}: planned and measured, and the error beside", _joints_figure(motion))
         for motion, name in zip(replay.motions, _figure_names(len(replay.motions)), strict=True)
     ]
     beside = {"summary.json": "all numbers, in SI units", **{f"{one.name}.svg": one.caption for one in drawn}}
@@ -57,7 +56,7 @@ def replay_files(
             title=title,
             command=command,
             sections=[
-                Card("Joints", tables(replay.tables())),
+                *table_cards(replay.tables()),
                 Card("Over time", figures(drawn)),
                 Card("Files", downloads(beside)),
             ],
@@ -91,7 +90,7 @@ def _joints_figure(motion: ReplayedMotion) -> str:
     """Draw each joint: its position as planned and measured, and its error beside."""
     tracking, measured = motion.tracking, motion.measured
     names = measured.names if tracking is None else tracking.names
-    figure = empty_figure((8.4, 0.6 + 1.35 * len(names)))
+    figure = empty_figure((8.4, 0.8 + 1.5 * len(names)))
     grid = figure.subplots(len(names), 1 if tracking is None else 2, sharex=True, squeeze=False)
     for i, name in enumerate(names):
         unit, scale = "rad or m", 1.0
@@ -100,22 +99,24 @@ def _joints_figure(motion: ReplayedMotion) -> str:
             unit, scale = units.display, units.scale
         axis = grid[i, 0]
         if tracking is None:
-            rows = evenly_spaced(len(measured.t), _POINTS)
+            rows = thinned_rows(len(measured.t))
             axis.plot(measured.t[rows], measured.q[rows, i] / scale, linewidth=1.0)
         else:
-            rows = evenly_spaced(len(tracking.t), _POINTS)
+            rows = thinned_rows(len(tracking.t))
             t = tracking.t[rows]
             axis.plot(t, tracking.planned[rows, i] / scale, color="C0", alpha=0.35, linewidth=3.0, label="planned")
             axis.plot(t, tracking.measured[rows, i] / scale, color="C1", linewidth=1.0, label="measured")
             error = largest_between(tracking.error[:, [i]], rows)[:, 0]
+            error_unit = "rad or m" if motion.arm is None else motion.arm.joints[i].units.position
             grid[i, 1].plot(t, error, color="C3", linewidth=0.9)
+            grid[i, 1].set_ylabel(error_unit, fontsize="small")
             grid[i, 1].grid(visible=True, alpha=0.3)
-        axis.set_ylabel(f"{plain_label(name)}, {unit}", fontsize="small")
+        axis.set_title(plain_label(name), fontsize="small", loc="left")
+        axis.set_ylabel(unit, fontsize="small")
         axis.grid(visible=True, alpha=0.3)
-    grid[0, 0].set_title("position", fontsize="medium")
     if tracking is not None:
-        grid[0, 0].legend(fontsize="small", loc="upper right")
-        grid[0, 1].set_title("measured less planned, rad or m", fontsize="medium")
+        grid[0, 0].legend(fontsize="x-small", loc="upper right")
+        grid[0, 1].set_title("measured less planned", fontsize="small", loc="left")
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
     return svg_text(figure)
@@ -134,24 +135,39 @@ def _page(
     cell: Cell | None,
 ) -> RunPage:
     about = replay.log.about
-    program, text = (about.get(key, "") for key in ("program", "text"))
+    program, text = (str(about.get(key, "")) for key in ("program", "text"))
     start = min(float(motion.measured.t[0]) for motion in motions)
     end = max(float(motion.measured.t[-1]) for motion in motions)
     records = [_record(motion, start, bases.get(motion.name, np.eye(4))) for motion in motions]
     return RunPage(
         title=title,
         status="finished",
-        program_name=program if isinstance(program, str) else "",
-        program_text=text if isinstance(text, str) else "",
+        program_name=program if text else replay.log.path.name,
+        program_text=text or _topics_text(replay),
+        text_kind="Program" if text else "Topics",
         cell_name=cell.name if cell is not None else str(about.get("cell", "")),
         generated_by=f"armwright {__version__}",
         command=command,
         duration=end - start,
         messages=[Message(severity="note", text=note) for note in replay.notes],
-        effects=_effects(replay, start, end),
+        # Lines of others name lines of programs that are not in the log.
+        effects=_effects(replay, start, end) if text else [],
         arms=records,
         animation=_animation(motions, start, end, bases, cell),
         collisions="not looked for in a log",
+    )
+
+
+def _topics_text(replay: Replay) -> str:
+    """Return the topics of a log, one on a line, with what they are."""
+    roles = {}
+    for motion in replay.motions:
+        roles[motion.measured.topic] = "measured" if motion.tracking is not None else "alone"
+        if motion.planned is not None:
+            roles.setdefault(motion.planned.topic, "planned")
+    return "".join(
+        f"{topic}  # {roles.get(topic, 'not shown')}, {counted(len(states.t), 'state')}\n"
+        for topic, states in replay.log.topics.items()
     )
 
 

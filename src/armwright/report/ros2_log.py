@@ -18,9 +18,12 @@ from armwright.extras import import_extra
 from armwright.report.foxglove_log import cap_position
 from armwright.report.log_content import (
     Entity,
+    Frames,
     JointsPayload,
     LogContent,
     LogEvent,
+    Payload,
+    Scene,
     SceneShape,
     Transform,
     timed_messages,
@@ -74,7 +77,7 @@ class _Messages:
     def __init__(self, types: Mapping[str, Any]) -> None:
         self._types = types
 
-    def message(self, time: int, payload: object) -> Any:
+    def message(self, time: int, payload: Payload) -> Any:
         """Return a message at a time [ns]."""
         stamp = self._new("builtin_interfaces/Time", sec=time // 10**9, nanosec=time % 10**9)
         match payload:
@@ -104,12 +107,12 @@ class _Messages:
                 return self._new("sensor_msgs/CompressedImage", header=header, format="png", data=data)
             case str():
                 return self._new("std_msgs/String", data=payload)
-            case [Transform(), *_]:
-                transforms = [self._transform(stamp, frame) for frame in payload]
-                return self._new("tf2_msgs/TFMessage", transforms=transforms)
-            case _:
-                assert isinstance(payload, list)  # noqa: S101 - the rest of what a log holds
-                markers = [marker for entity in payload for marker in self._markers(stamp, entity)]
+            case Frames(transforms):
+                return self._new(
+                    "tf2_msgs/TFMessage", transforms=[self._transform(stamp, frame) for frame in transforms]
+                )
+            case Scene(entities):
+                markers = [marker for entity in entities for marker in self._markers(stamp, entity)]
                 return self._new("visualization_msgs/MarkerArray", markers=markers)
 
     def _new(self, kind: str, /, **fields: Any) -> Any:

@@ -53,7 +53,8 @@ def with_near_frames(nominal: Arm, transforms: Array) -> Arm:
         transforms: (n + 1, 4, 4) what stands before the rotation of the first joint, and behind that of each joint.
     """
     targets = [np.eye(4), *joint_transforms(nominal)]
-    placed, rest = [], np.eye(4)
+    placed: list[Array] = []
+    rest: Array = np.eye(4)
     for transform, target in zip(transforms, targets, strict=True):
         X = rest @ transform
         is_last = len(placed) == nominal.n
@@ -78,7 +79,8 @@ def with_table(nominal: Arm, transforms: Array) -> Arm:
         nominal: the arm, with n revolute joints; of two common normals the one nearer to its own counts.
         transforms: (n, 4, 4) what follows the rotation of each joint.
     """
-    joints, rest = [], np.eye(4)
+    joints: list[Joint] = []
+    rest: Array = np.eye(4)
     for joint, M in zip(nominal.joints, transforms, strict=True):
         X = rest @ M
         if len(joints) + 1 < nominal.n:
