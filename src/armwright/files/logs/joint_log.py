@@ -136,7 +136,9 @@ def read_joint_log(path: Path | str) -> JointLog:
         raise TooFewError(f"{path}: no joint states; topics of the log: {topics or 'none'}")
     start = min(rows.first_time for rows in collected.values())
     topics_read = {topic: rows.joint_states(start) for topic, rows in sorted(collected.items())}
-    return JointLog(path=path, start=start, topics=topics_read, about=about, lines=tuple(sorted(lines)))
+    return JointLog(
+        path=path, start=start, topics=topics_read, about=about, lines=tuple(sorted(lines, key=lambda line: line.time))
+    )
 
 
 class _TopicRows:

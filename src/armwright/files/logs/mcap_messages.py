@@ -67,6 +67,7 @@ class _Reader:
         self._schemas: dict[int, Any] = {}
         self._channels: dict[int, Channel | None] = {}
         self._largest = limit("log_record_mb") * MEGABYTE
+        self._count, self._most_records = 0, limit("log_records")
         self._unpacked, self._most_unpacked = 0, limit("log_unpacked_mb") * MEGABYTE
 
     def messages(self, file: BinaryIO, size: int) -> Iterator[RawMessage]:
@@ -99,6 +100,9 @@ class _Reader:
                 raise _DamagedError(f"a record of {length} bytes ends early: {left} bytes are left")
             if length > self._largest:
                 self._refuse("log_record_mb", length)
+            self._count += 1
+            if self._count > self._most_records:
+                raise FileFormatError(self._path, None, "", f"too many records: {limit_message('log_records')}")
             yield kind, file.read(length)
             left -= length
 
