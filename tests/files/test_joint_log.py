@@ -230,6 +230,7 @@ def test_ends_early(part: float, tmp_path: Path) -> None:
         (record(4, struct.pack("<HHI", 1, 0, 2**31) + b"x"), "a record"),
         (record(3, struct.pack("<HI", 1, 3) + b"\xff\xfe\xfd"), "a record is damaged: UnicodeDecodeError"),
         (chunk(b"abc", "zstd", 3), "a chunk cannot be unpacked"),
+        (record(6, bytes(32) + struct.pack("<Q", 2**64 - 1)), "a record is damaged: OverflowError"),
         (chunk(b"abcdefghijklmnop", "lz4", 3), "a chunk cannot be unpacked"),
         (chunk(b"abc", "rar", 3), "a chunk is compressed by 'rar'; expected zstd, lz4, or not at all"),
         (chunk(b"abc", "", 4), "a chunk is said to unpack to 4 bytes, and does not"),
@@ -334,6 +335,13 @@ def test_damaged_databases(tmp_path: Path) -> None:
     path = tmp_path / "a.db3"
     path.write_bytes(b"SQLite format 3\0" + bytes(200))
     assert "the database is damaged" in refused(path)
+    path.unlink()
+    database(path, T[:2], Q[:2])
+    base = sqlite3.connect(path)
+    base.execute("UPDATE topics SET name = CAST(x'2f92' AS TEXT)")
+    base.commit()
+    base.close()
+    assert list(read_joint_log(path).topics) == ["/\N{REPLACEMENT CHARACTER}"]
     path.unlink()
     base = sqlite3.connect(path)
     base.execute("CREATE TABLE topics (id INTEGER)")

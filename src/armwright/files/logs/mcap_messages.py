@@ -50,7 +50,7 @@ def mcap_messages(path: Path, file: BinaryIO, size: int, wanted: Callable[[Chann
         yield from reader.messages(file, size - len(MAGIC))
     except _DamagedError as error:
         raise FileFormatError(path, None, "", f"{error}") from None
-    except (struct.error, UnicodeDecodeError, EOFError, ValueError, KeyError) as error:
+    except (struct.error, EOFError, KeyError, OverflowError, ValueError) as error:
         if isinstance(error, FileFormatError):
             raise
         raise FileFormatError(path, None, "", f"a record is damaged: {type(error).__name__}: {error}") from error

@@ -32,6 +32,7 @@ def sqlite_messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[R
     """
     try:
         with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+            base.text_factory = lambda text: text.decode("utf-8", "replace")
             base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, limit("log_record_mb") * MEGABYTE)
             base.execute("PRAGMA trusted_schema = OFF")
             tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
@@ -50,5 +51,6 @@ def sqlite_messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[R
                     if not isinstance(time, int) or not isinstance(data, bytes):
                         raise FileFormatError(path, None, channel.topic, "expected a time and bytes in each message")
                     yield RawMessage(channel, time, data)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        # What SQLite says quotes the file, which may be no text.
         raise FileFormatError(path, None, "", f"the database is damaged: {error}") from error
