@@ -143,3 +143,14 @@ def test_no_log() -> None:
     assert done.returncode == ExitStatus.FILE
     assert done.stderr.count("\n") == 1
     assert "expected an MCAP file or a .db3 of ROS 2" in done.stderr
+
+
+def test_results_beside_the_log(tmp_path: Path) -> None:
+    """A log is not removed as an older result of the folder in which it is replayed."""
+    assert armwright("run", *RUN, "-o", tmp_path / "out", "--log", "mcap", "-q").returncode == 0
+
+    done = armwright("replay", tmp_path / "out" / "log.mcap", "-o", tmp_path / "out")
+
+    assert done.returncode != 0
+    assert "log.mcap" in done.stderr
+    assert (tmp_path / "out" / "log.mcap").exists()

@@ -14,6 +14,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 
 from armwright.errors import ArmwrightError, FileFormatError, TooFewError, UnknownNameError
 from armwright.files.limits import raised
+from armwright.files.logs import joint_log
 from armwright.files.logs.joint_log import JointStates, read_joint_log
 from files.logs_of_others import (
     EPOCH,
@@ -271,6 +272,15 @@ def test_sizes(tmp_path: Path) -> None:
         file.truncate(2_000_000)
     with raised(log_mb=1):
         assert "too large: 2; the limit is 1 MB" in refused(path)
+
+
+def test_many_joints_with_few_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Messages that name a joint each make columns of all their joints, whose numbers are counted before."""
+    monkeypatch.setattr(joint_log, "_MAX_NUMBERS", 1000)
+    messages = [(0, i, json.dumps({"name": [f"j{i}"], "position": [0]}).encode()) for i in range(20)]
+    path = mcap_file(tmp_path / "a.mcap", [("/x", ROS2, "json", "jsonschema", b"{}")], messages)
+
+    assert "too many joint states: 1,200 numbers, expected 1,000" in refused(path)
 
 
 def test_checksum(tmp_path: Path) -> None:

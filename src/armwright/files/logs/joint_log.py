@@ -17,7 +17,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, TooFewError, UnknownNameError, shown
-from armwright.files.inputs import file_below, file_path
+from armwright.files.inputs import file_below, file_path, note_source
 from armwright.files.limits import MEGABYTE, limit, limit_message
 from armwright.files.logs.joint_decoders import Decoder, JointReading, holds_joint_states, joint_decoder
 from armwright.files.logs.line_decoders import LogLine, holds_lines, read_line
@@ -29,7 +29,9 @@ from armwright.files.logs.sqlite_messages import MAGIC as SQLITE, sqlite_message
 # Where armwright says what a log is of.
 ABOUT_TOPIC = "/armwright/run"
 _SUFFIXES = (".mcap", ".db3")
-_LARGEST_TIME = 2**63
+_LARGEST_TIME = 2**62
+# Numbers of all topics together: every joint of a topic has three in each of its rows.
+_MAX_NUMBERS = 60_000_000
 # Files of a bag at most.
 _MAX_FILES = 1000
 
@@ -103,42 +105,76 @@ def read_joint_log(path: Path | str) -> JointLog:
         MissingExtraError: what reads it is not installed.
     """
     path = file_path(path)
-    collected: dict[str, _TopicRows] = {}
-    about: dict[str, Any] = {}
-    seen: dict[str, str] = {}
-    lines: list[LogLine] = []
-    count, most = 0, limit("log_rows")
-
-    def wanted(channel: Channel) -> bool:
-        seen.setdefault(channel.topic, channel.kind)
-        return channel.topic == ABOUT_TOPIC or holds_joint_states(channel) or holds_lines(channel)
-
+    collected = _Collected(path)
     for file in _files(path):
         decoders: dict[Channel, Decoder] = {}
-        for message in _messages(file, wanted):
-            topic = message.channel.topic
-            if topic == ABOUT_TOPIC:
-                about = _about(message) or about
-                continue
-            if holds_lines(message.channel):
-                if len(lines) < limit("entries"):
-                    lines.append(_line(file, message))
-                continue
-            reading = _reading(file, message, decoders)
-            count += 1
-            if count > most:
-                raise FileFormatError(path, None, topic, f"too many joint states: {limit_message('log_rows')}")
-            if topic not in collected:
-                collected[topic] = _TopicRows(path, topic)
-            collected[topic].add(reading, reading.stamp or message.time)
-    if not collected:
-        topics = ", ".join(f"{topic} ({kind or 'no type'})" for topic, kind in list(seen.items())[:10])
-        raise TooFewError(f"{path}: no joint states; topics of the log: {topics or 'none'}")
-    start = min(rows.first_time for rows in collected.values())
-    topics_read = {topic: rows.joint_states(start) for topic, rows in sorted(collected.items())}
-    return JointLog(
-        path=path, start=start, topics=topics_read, about=about, lines=tuple(sorted(lines, key=lambda line: line.time))
-    )
+        for message in _messages(file, collected.wanted):
+            if message.channel.topic == ABOUT_TOPIC:
+                collected.about = _about(message) or collected.about
+            elif holds_lines(message.channel):
+                collected.add_line(_line(file, message))
+            else:
+                collected.add(message, _reading(file, message, decoders))
+    return collected.log()
+
+
+class _Collected:
+    """What was read of a log so far."""
+
+    def __init__(self, path: Path) -> None:
+        self.about: dict[str, Any] = {}
+        self._path = path
+        self._topics: dict[str, _TopicRows] = {}
+        self._seen: dict[str, str] = {}
+        self._lines: list[LogLine] = []
+        self._count, self._most = 0, limit("log_rows")
+
+    def wanted(self, channel: Channel) -> bool:
+        """Return whether the messages of a channel are read."""
+        self._seen.setdefault(channel.topic, channel.kind)
+        return channel.topic == ABOUT_TOPIC or holds_joint_states(channel) or holds_lines(channel)
+
+    def add_line(self, line: LogLine) -> None:
+        """Add a line of text; there are as many as may be."""
+        if len(self._lines) < limit("entries"):
+            self._lines.append(line)
+
+    def add(self, message: RawMessage, reading: JointReading) -> None:
+        """Add a joint state.
+
+        Raises:
+            FileFormatError: there are too many, or its names and numbers do not fit.
+        """
+        topic = message.channel.topic
+        self._count += 1
+        if self._count > self._most:
+            raise FileFormatError(self._path, None, topic, f"too many joint states: {limit_message('log_rows')}")
+        if topic not in self._topics:
+            self._topics[topic] = _TopicRows(self._path, topic)
+        self._topics[topic].add(reading, reading.stamp or message.time)
+
+    def log(self) -> JointLog:
+        """Return all of it.
+
+        Raises:
+            TooFewError: there is no joint state.
+            FileFormatError: columns of all joints would hold too many numbers.
+        """
+        if not self._topics:
+            topics = ", ".join(f"{topic} ({kind or 'no type'})" for topic, kind in list(self._seen.items())[:10])
+            raise TooFewError(f"{self._path}: no joint states; topics of the log: {topics or 'none'}")
+        numbers = sum(rows.numbers for rows in self._topics.values())
+        if numbers > _MAX_NUMBERS:
+            message = f"too many joint states: {numbers:,} numbers, expected {_MAX_NUMBERS:,}"
+            raise FileFormatError(self._path, None, "", message)
+        start = min(rows.first_time for rows in self._topics.values())
+        return JointLog(
+            path=self._path,
+            start=start,
+            topics={topic: rows.joint_states(start) for topic, rows in sorted(self._topics.items())},
+            about=self.about,
+            lines=tuple(sorted(self._lines, key=lambda line: line.time)),
+        )
 
 
 class _TopicRows:
@@ -188,6 +224,11 @@ class _TopicRows:
         """The earliest time [ns]."""
         return min(min(times) for times, _ in self._rows.values())
 
+    @property
+    def numbers(self) -> int:
+        """How many numbers the columns of all its joints hold."""
+        return 3 * len(self._columns) * sum(len(times) for times, _ in self._rows.values())
+
     def joint_states(self, start: int) -> JointStates:
         """Return all rows in order of time, from a time on [ns]."""
         n = len(self._columns)
@@ -229,6 +270,7 @@ def _messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[RawMess
             message = f"too large: {limit_message('log_mb', f'{size / MEGABYTE:,.0f}')}"
             raise FileFormatError(path, None, "", message)
         with path.open("rb") as file:
+            note_source(path)
             head = file.read(len(SQLITE))
             if not head.startswith((MCAP, SQLITE)):
                 _refuse(path, head)
