@@ -116,7 +116,7 @@ editor:           ## Build, check and package the VS Code extension (needs npm)
 
 fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes under watch (hours; TARGET=cell RUNS=1000)
 	for target in $(or $(FILES),arm linkage urdf mjcf cell world mesh step poses iso9283 calibration clearance pictures corners \
-	    picture_joints lens); do \
+	    picture_joints lens log robot); do \
 	    $(BIN)/python -W ignore fuzz/files.py $$target $(or $(RUNS),100000) || exit 1; done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	for target in $(or $(TARGET),tokens tree cell code program format); do \

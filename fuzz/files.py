@@ -2,7 +2,8 @@
 
 Targets are `arm`, `linkage`, `urdf`, `mjcf`, `cell`, `world` (cells with physics, which are begun), `mesh`, `step`,
 `poses`, `iso9283`, `calibration` and `clearance` (measured tables), `pictures`, `corners`, `picture_joints` and `lens`
-(of a camera). It needs nothing beside armwright; `world`, `step` and `pictures` need its extras.
+(of a camera), `log` (MCAP and bags of ROS 2) and `robot` (the calibration of one). It needs the extra `logs`; `world`,
+`step` and `pictures` need other extras.
 
 An input is a valid file in which keys, numbers, types, lines and cells were changed, lost, doubled, nested or put
 elsewhere. It fails when anything but the reader's own error is raised, when it takes more than five seconds, or when
@@ -17,6 +18,7 @@ import random
 import re
 import resource
 import signal
+import sqlite3
 import sys
 import tempfile
 import time
@@ -25,11 +27,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 from PIL import Image
 
 from armwright.accuracy.measurement_file import read_measurements as read_accuracy
 from armwright.arm.load import load_arm, read_arm
 from armwright.arm.mjcf.reader import load_mjcf
+from armwright.arm.universal_robots.calibrated_arm import calibrated_arm
 from armwright.arm.urdf.reader import load_urdf
 from armwright.calibration.board import Board
 from armwright.calibration.camera_tables import read_corners, read_lens, read_picture_joints
@@ -40,12 +44,17 @@ from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measurement_file import read_clearance_measurements
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
+from armwright.files.logs.joint_log import read_joint_log
 from armwright.files.pictures import read_grey_picture
 from armwright.motion.poses_file import read_poses
+from armwright.motion.replay import arms_of, bases_of, replay
 from armwright.physics.collisions import CellCollisions
 from armwright.physics.mjcf import arm_mjcf
 from armwright.physics.trials import draw_case
 from armwright.physics.world import PhysicsCell
+from armwright.report.log_content import simulation_log_content
+from armwright.report.ros2_log import ros2_bag
+from armwright.simulation.simulator import simulate
 from armwright.spatial.meshes.reader import read_mesh
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -289,6 +298,61 @@ def _read_picture(path: Path) -> None:
     read_grey_picture(named)
 
 
+def _logs() -> list[str]:
+    """Return small logs in hexadecimal digits: joint states in JSON and CDR, a trace, what made it, and a database."""
+    simulation = simulate(load_arm("puma560"), np.zeros(6), duration=0.02, period=0.01)
+    bag = ros2_bag(simulation_log_content(simulation))["bag.mcap"]
+    messages = [
+        ("/js", "sensor_msgs/msg/JointState", b'{"name": ["a", "b"], "position": [1, 2], "velocity": [3, 4]}'),
+        ("/js", "sensor_msgs/msg/JointState", b'{"name": ["b"], "header": {"stamp": {"sec": 1, "nanosec": 2}}}'),
+        ("/js", "sensor_msgs/msg/JointState", b'{"name": ["a", "b"], "position": [1, 3], "effort": [3, 4]}'),
+        ("/js", "sensor_msgs/msg/JointState", b'{"name": ["a", "b"], "position": [1, 4], "effort": [3, 4]}'),
+        (
+            "/plan",
+            "foxglove.JointStates",
+            b'{"timestamp": {"sec": 0, "nsec": 0}, "joints": [{"name": "a", "position": 1}]}',
+        ),
+        ("/log", "foxglove.Log", b'{"message": "hello", "level": 2, "line": 3, "name": "x"}'),
+        ("/armwright/run", "armwright.Run", b'{"arms": {"A": {"file": "name = \'x\'", "base": [1, 0, 0, 0, 1, 0]}}}'),
+    ]
+    file = io.BytesIO()
+    # Without checksums, which nearly every change would break, and packed in chunks that are read as they are.
+    writer = Writer(file, compression=CompressionType.NONE, enable_crcs=False)
+    writer.start()
+    channels: dict[str, int] = {}
+    for time_ns, (topic, kind, data) in enumerate(messages):
+        if topic not in channels:
+            channels[topic] = writer.register_channel(topic, "json", writer.register_schema(kind, "jsonschema", b"{}"))
+        writer.add_message(channels[topic], log_time=time_ns, publish_time=time_ns, data=data)
+    writer.finish()
+    base = sqlite3.connect(":memory:")
+    base.execute("CREATE TABLE topics (id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT)")
+    base.execute("CREATE TABLE messages (id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)")
+    base.execute("INSERT INTO topics VALUES (1, '/js', 'sensor_msgs/msg/JointState', 'cdr')")
+    state = bytes.fromhex("00010000 01000000 02000000 01000000 00000000 01000000 02000000 61000000 00000000 00000000")
+    base.execute("INSERT INTO messages (topic_id, timestamp, data) VALUES (1, 5, ?)", (state + bytes(8),))
+    base.commit()
+    logs = (bag, file.getvalue(), file.getvalue(), bytes(base.serialize()))
+    return [log.hex(" ", 4) for log in logs]
+
+
+def _read_log(path: Path) -> None:
+    """Read a log, and replay it."""
+    named = path.with_suffix(".mcap")
+    named.write_bytes(_bytes_of(path.read_bytes()))
+    log = read_joint_log(named)
+    result = replay(log, arms=arms_of(log))
+    bases_of(log)
+    result.as_data()
+    list(result.tables())
+
+
+def _read_robot(path: Path) -> None:
+    """Read the calibration of one robot, in the form that it is in."""
+    is_yaml = b"kinematics" in path.read_bytes()
+    calibrated_arm(load_arm("ur5"), path.rename(path.with_suffix(".yaml" if is_yaml else ".conf")))
+
+
 _LENS = """[cameras.TOP]
 width      = 640
 height     = 480
@@ -332,6 +396,8 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
         lambda path: read_picture_joints(path, load_arm("ur5")),
         lambda: _tables(EXAMPLES / "board_joints.csv", lines=40),
     ),
+    "log": (".txt", _read_log, _logs),
+    "robot": (".conf", _read_robot, lambda: _texts(*(ROOT / "tests" / "arm" / "universal_robots").glob("*.[cy]*"))),
     "lens": (".toml", read_lens, lambda: [_LENS]),
     "clearance": (
         ".csv",

@@ -9,12 +9,19 @@ import pinocchio
 import pytest
 from scipy.spatial.transform import Rotation
 
+from armwright.arm import calibrated_arm
 from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arm.write import toml_text
 from armwright.arrays import Array
 from armwright.calibration.chain import kinematic_chain
-from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf, position_covariance
+from armwright.calibration.correction import (
+    corrected_arm,
+    corrected_tables,
+    corrected_urdf,
+    position_covariance,
+    robot_files,
+)
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.fitting import Calibration, calibrate_points
 from armwright.calibration.readings import readings
@@ -215,3 +222,38 @@ def test_nothing_known() -> None:
     """An arm of the catalogue does not say how well it is known."""
     with pytest.raises(InvalidValueError, match="puma560: its dimensions have no covariance; calibrate"):
         position_covariance(load_arm("puma560"), np.zeros(6))
+
+
+def test_files_of_robots(tmp_path: Path, rng: np.random.Generator) -> None:
+    """What was identified of a UR5, tilts of parallel axes included, moves its last link as in URDF."""
+    arm = load_arm("ur5")
+    chain = kinematic_chain(arm)
+    q = configurations(rng, arm, 60)
+    errors = np.where(chain.is_length, 5e-4, 2e-3) * rng.standard_normal(len(chain.names))
+    found = calibrate_points(arm, q, seen(chain, q, errors, 1e-5, rng))
+    assert any(name.endswith(".beta") for name in found.names)
+    (tmp_path / "arm.urdf").write_text(corrected_urdf(found), encoding="utf-8")
+    description = pinocchio.buildModelFromUrdf(str(tmp_path / "arm.urdf"))
+    data, links = description.createData(), [description.getFrameId(f"link_{i}") for i in (0, 6)]
+
+    def last_link(positions: Array) -> Array:
+        pinocchio.framesForwardKinematics(description, data, positions)
+        first, last = (data.oMf[link] for link in links)
+        return np.asarray((first.inverse() * last).homogeneous)
+
+    for name, text in robot_files(found).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        one, notes = calibrated_arm(arm, tmp_path / name)
+        assert notes == []
+        # Frames of the last link may differ by a constant pose, those of the base by what lies along the first axis.
+        behind = [np.linalg.inv(last_link(x)) @ np.linalg.inv(one.base) @ forward(one, x) for x in q]
+        np.testing.assert_allclose(behind, np.broadcast_to(behind[0], (len(q), 4, 4)), rtol=0, atol=1e-9)
+
+
+def test_files_of_other_robots(rng: np.random.Generator) -> None:
+    """A PUMA has no such files."""
+    arm = load_arm("puma560")
+    chain = kinematic_chain(arm)
+    q = configurations(rng, arm, 60)
+
+    assert robot_files(calibrate_points(arm, q, seen(chain, q, np.zeros(len(chain.names)), 1e-5, rng))) == {}

@@ -171,7 +171,7 @@ def test_other_commands_read_urdf() -> None:
     ("arguments", "status", "said"),
     [
         (("puma560",), 2, "-o: missing; specify the file to write, or the format as --to, which is printed then"),
-        (("puma560", "-o", "puma.yml"), 2, "expected a name that ends in .urdf, .xml or .toml, got puma.yml"),
+        (("puma560", "-o", "puma.yml"), 2, "a name that ends in .urdf, .xml, .toml, .conf or .yaml, got puma.yml"),
         (("puma560", "--to", "mjfc"), 2, "'mjfc' is not one of 'urdf', 'mjcf', 'toml'"),
         (("ntu-3r", "-o", "ntu.xml"), 3, "specify mass and inertia of link 3"),
         ((CELL, "-o", "cell.urdf"), 2, "is a cell; expected mjcf, as the other formats hold a single arm"),
@@ -225,3 +225,28 @@ def test_cannot_be_written(tmp_path: Path) -> None:
     assert done.returncode == 4
     assert done.stderr.startswith(f"armwright: cannot write '{tmp_path / 'puma.toml'}': ")
     assert [path.name for path in tmp_path.iterdir()] == ["puma.toml"]
+
+
+def test_calibration_of_one_robot(tmp_path: Path) -> None:
+    """The calibration of one robot makes an arm file of its model, and comes out of that in both forms."""
+    own = Path(__file__).parents[1] / "arm" / "universal_robots" / "ur5.yaml"
+    done = armwright("convert", "ur5", "--calibration", own, "-o", tmp_path / "mine.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "read as ur_calibration writes them" in done.stdout
+    missing = armwright("convert", tmp_path / "mine.toml", "-o", tmp_path / "mine.conf")
+    assert missing.returncode == 2
+    assert "--model" in missing.stderr
+
+    q, mine = np.linspace(-1, 1, 6), load_arm(tmp_path / "mine.toml")
+    for name, more in (("mine.conf", ("--model", "ur5")), ("mine.yaml", ())):
+        assert armwright("convert", tmp_path / "mine.toml", *more, "-o", tmp_path / name).returncode == 0
+        assert armwright("convert", "ur5", "--calibration", tmp_path / name, "-o", tmp_path / "a.toml").returncode == 0
+        np.testing.assert_allclose(forward(load_arm(tmp_path / "a.toml"), q), forward(mine, q), atol=1e-9)
+
+
+def test_calibration_of_a_cell() -> None:
+    """A cell has no calibration of one robot."""
+    done = armwright("convert", CELL, "--calibration", "mine.conf", "-o", "cell.xml")
+
+    assert done.returncode == 2
+    assert "expected an arm, got the cell" in done.stderr

@@ -129,8 +129,24 @@ def read_arm(path: Path | str) -> Arm:
     Raises:
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
-    path = file_path(path)
-    top = Document.read(path).root
+    return _arm(Document.read(path))
+
+
+def parse_arm(text: str, path: Path | str) -> Arm:
+    """Return the arm of the text of an arm file that stands in another file.
+
+    Args:
+        text: in TOML; its format is in docs/arms.md.
+        path: of that other file, for messages.
+
+    Raises:
+        FileFormatError: the text is broken, or says what cannot be.
+    """
+    return _arm(Document.parse(file_path(path), text, is_json=False))
+
+
+def _arm(document: Document) -> Arm:
+    top = document.root
     convention = top.choice("convention", ("standard", "modified", "urdf"), default="standard")
     tables = top.tables("joint", "joints")
     coupled, coupling = "coupling" in top, top.table("coupling")
@@ -158,7 +174,7 @@ def read_arm(path: Path | str) -> Arm:
     gravity = top.table("gravity")
     stated = "m_per_s2" in gravity
     arm = Arm(
-        name=top.text("name", default=path.stem),
+        name=top.text("name", default=document.path.stem),
         title=top.text("title", default=""),
         joints=joints,
         links=links,

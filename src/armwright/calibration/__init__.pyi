@@ -9,7 +9,11 @@ from .camera_tables import (
     read_picture_joints as read_picture_joints,
 )
 from .compensation import CalibratedInverse as CalibratedInverse, inverse_calibrated as inverse_calibrated
-from .correction import corrected_arm as corrected_arm, position_covariance as position_covariance
+from .correction import (
+    corrected_arm as corrected_arm,
+    position_covariance as position_covariance,
+    robot_files as robot_files,
+)
 from .cross_validation import cross_validate as cross_validate
 from .experiment_design import (
     MeasurementPlan as MeasurementPlan,

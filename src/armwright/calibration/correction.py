@@ -14,11 +14,14 @@ from armwright.arm.dh import to_modified
 from armwright.arm.gravity import felt_gravity
 from armwright.arm.model import Arm, Joint
 from armwright.arm.uncertainty import Uncertainty
+from armwright.arm.universal_robots.calibration_conf import calibration_conf
+from armwright.arm.universal_robots.joint_frames import joint_transforms, with_near_frames
+from armwright.arm.universal_robots.kinematics_yaml import kinematics_yaml
 from armwright.arm.urdf.writer import urdf_text
 from armwright.arrays import Array, ArrayLike
 from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.calibration.fitting import Calibration
-from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.errors import InvalidValueError, UnknownNameError, UnsupportedArmError
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import rotation_from_vector
@@ -71,6 +74,25 @@ def corrected_tables(calibration: Calibration) -> dict[str, str]:
     rows, last = to_modified(arm.joints)
     standard = _csv_table(arm.base, arm.joints, arm.tool)
     return {"standard": standard, "modified": _csv_table(arm.base, rows, last @ arm.tool)}
+
+
+def robot_files(calibration: Calibration) -> dict[str, str]:
+    """Return the files by which the makers of an arm keep its calibration, all estimated errors of its joints included.
+
+    There are such files of arms of Universal Robots: ``calibration.conf`` and ``kinematics.yaml`` for ROS 2. Poses of
+    base and tool are not in them.
+
+    Raises:
+        InvalidValueError: an error model of a joint was fitted.
+    """
+    arm, model = _corrected_without_tilts(calibration), calibration.chain.arm
+    if any(joint.fixed is not None or not joint.revolute for joint in model.joints):
+        return {}
+    near = with_near_frames(model, np.array([np.eye(4), *joint_transforms(arm, _tilts(calibration))]))
+    try:
+        return {"calibration.conf": calibration_conf(near, model), "kinematics.yaml": kinematics_yaml(near)}
+    except UnsupportedArmError:
+        return {}
 
 
 def position_covariance(arm: Arm, q: ArrayLike) -> Array:

@@ -10,6 +10,7 @@ from armwright.cli.commands import App
 
 COMMANDS = {
     "run": "Run an RLO program in a simulated cell.",
+    "replay": "Show the joint states of a log, measured beside planned, with tracking errors and delays of each joint.",
     "check": "Check RLO programs without running them.",
     "explain": "Explain the code of a diagnostic: what it means, what to do, a wrong program and a correct one.",
     "repl": "Enter RLO interactively: each statement is executed in a simulated cell, and can be undone.",

@@ -25,9 +25,17 @@ class Format(enum.StrEnum):
     URDF = "urdf"
     MJCF = "mjcf"
     TOML = "toml"
+    UR_CALIBRATION = "ur-calibration"
+    ROS2_KINEMATICS = "ros2-kinematics"
 
 
-SUFFIXES = {Format.URDF: ".urdf", Format.MJCF: ".xml", Format.TOML: ".toml"}
+SUFFIXES = {
+    Format.URDF: ".urdf",
+    Format.MJCF: ".xml",
+    Format.TOML: ".toml",
+    Format.UR_CALIBRATION: ".conf",
+    Format.ROS2_KINEMATICS: ".yaml",
+}
 
 
 class Converted(NamedTuple):
@@ -52,7 +60,11 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: Annotated[str, Argument(help="Arm from the catalogue, or the path of a file of an arm or a cell.")],
     output: Annotated[
         Path | None,
-        Option("-o", "--output", help="File to write: .urdf, .xml for MJCF, or .toml for an arm file."),
+        Option(
+            "-o",
+            "--output",
+            help="File to write: .urdf, .xml for MJCF, .toml for an arm file; .conf or .yaml for a calibration.",
+        ),
     ] = None,
     to: Annotated[
         Format | None, Option(help="Format to write; without -o it is printed. The default is that of the file's name.")
@@ -64,11 +76,19 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         Option(help="Joints of such a file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
     package: Packages = None,
+    calibration: Annotated[
+        Path | None,
+        Option(help="Calibration of a robot to apply: calibration.conf of Universal Robots, or its .yaml for ROS 2."),
+    ] = None,
+    model: Annotated[
+        str | None, Option(help="Model from which calibration.conf differs; the default with --calibration is the arm.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Write an arm as URDF, as MJCF or as an arm file, or a cell as MJCF, and report what the format cannot represent.
 
-    Of an assembly in STEP or glTF, write the frames of its named components, for IMPORT.
+    Of an assembly in STEP or glTF, write the frames of its named components, for IMPORT. With --calibration, an arm of
+    Universal Robots gets the geometry of one robot, which can also be written: -o calibration.conf, -o kinematics.yaml.
 
     **Example:** `armwright convert puma560 -o puma560.urdf`
     """
@@ -88,7 +108,11 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--json", "expected -o and the name of a file to write")
     if output is not None and output.exists() and Path(arm).exists() and output.samefile(arm):
         raise usage_error("-o", "expected another file than the input, which may hold more than an arm")
-    done = _converted_cell(arm, to) if _is_cell(arm) else _converted_arm(to, _read(arm, base, tip, lock, package))
+    if _is_cell(arm):
+        done = _converted_cell(arm, to, calibration)
+    else:
+        model_name = model or (None if calibration is None else arm)
+        done = _converted_arm(to, _calibrated(_read(arm, base, tip, lock, package), calibration), model_name)
     if output is None:
         print(done.text, end="")
         for sentence in (*done.notes, *done.lost):
@@ -112,7 +136,7 @@ def _format(output: Path | None, to: Format | None) -> Format:
     for kind, suffix in SUFFIXES.items():
         if output.suffix.lower() == suffix:
             return kind
-    raise usage_error("-o", f"expected a name that ends in .urdf, .xml or .toml, got {output}")
+    raise usage_error("-o", f"expected a name that ends in .urdf, .xml, .toml, .conf or .yaml, got {output}")
 
 
 def _is_cell(path: str) -> bool:
@@ -122,10 +146,12 @@ def _is_cell(path: str) -> bool:
     return path.lower().endswith((".toml", ".json")) and "arms" in Document.read(Path(path)).root
 
 
-def _converted_cell(path: str, to: Format) -> Converted:
+def _converted_cell(path: str, to: Format, calibration: Path | None) -> Converted:
     from armwright.cell.reader import read_cell
     from armwright.physics.mjcf import cell_mjcf
 
+    if calibration is not None:
+        raise usage_error("--calibration", f"expected an arm, got the cell '{path}'")
     if to is not Format.MJCF:
         raise usage_error("--to", f"'{path}' is a cell; expected mjcf, as the other formats hold a single arm")
     cell = read_cell(path)
@@ -134,12 +160,24 @@ def _converted_cell(path: str, to: Format) -> Converted:
     return Converted(cell.name, file.text, counts, [], list(file.lost))
 
 
-def _converted_arm(to: Format, reading: "tuple[Arm, list[str]]") -> Converted:
+def _calibrated(reading: "tuple[Arm, list[str]]", calibration: Path | None) -> "tuple[Arm, list[str]]":
+    """Return an arm with the calibration of one robot, and further notes."""
+    if calibration is None:
+        return reading
+    from armwright.arm.universal_robots.calibrated_arm import calibrated_arm
+
+    arm, notes = calibrated_arm(reading[0], calibration)
+    return arm, [*reading[1], *notes]
+
+
+def _converted_arm(to: Format, reading: "tuple[Arm, list[str]]", model_name: str | None) -> Converted:
     from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
     from armwright.arm.write import toml_text, without_meshes
 
     model, notes = reading
-    if to is Format.MJCF:
+    if to in {Format.UR_CALIBRATION, Format.ROS2_KINEMATICS}:
+        text, lost = _calibration_text(to, model, model_name)
+    elif to is Format.MJCF:
         from armwright.physics.mjcf import arm_mjcf
 
         file = arm_mjcf(model)
@@ -150,6 +188,20 @@ def _converted_arm(to: Format, reading: "tuple[Arm, list[str]]") -> Converted:
         kept, lost = without_meshes(model)
         text = toml_text(kept)
     return Converted(model.name, text, {"joints": model.n}, notes, lost)
+
+
+def _calibration_text(to: Format, arm: "Arm", model_name: str | None) -> tuple[str, list[str]]:
+    """Return an arm as a calibration of Universal Robots, and what is not in it."""
+    from armwright.arm.load import load_arm
+    from armwright.arm.universal_robots.calibration_conf import calibration_conf
+    from armwright.arm.universal_robots.kinematics_yaml import kinematics_yaml
+
+    lost = ["poses of base and tool, limits, masses and solids are not in a calibration"]
+    if to is Format.ROS2_KINEMATICS:
+        return kinematics_yaml(arm), lost
+    if model_name is None:
+        raise usage_error("--model", "missing; specify the arm from which calibration.conf differs, such as ur5")
+    return calibration_conf(arm, load_arm(model_name)), lost
 
 
 def _rest_of_cell(arm: "Arm") -> list[str]:

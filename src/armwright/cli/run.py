@@ -8,7 +8,7 @@ import typer
 from typer import Option
 
 from armwright.cli.numbers import within
-from armwright.cli.options import Json, OutputFolder, QuietButWarnings, usage_error
+from armwright.cli.options import Json, Log, OutputFolder, QuietButWarnings, check_log, usage_error
 from armwright.cli.output import command_line, print_json, print_result, print_result_table
 from armwright.cli.programs import (
     CellFile,
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from armwright.program.language.diagnostic import Diagnostic
     from armwright.program.vm.machine import Limits, RunError
     from armwright.program.vm.recording import Recording
+    from armwright.report.log_files import LogFormat
     from armwright.report.run_files import RunInputs
 
 
@@ -78,6 +79,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     scheduler: Annotated[
         str | None, Option(help="Address of a Dask scheduler for --trials, as in tcp://10.0.0.1:8786.")
     ] = None,
+    log: Log = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
@@ -97,10 +99,11 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     With -o the command writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line),
     frames.json (the final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the
-    disk and shows the arm moving. With --around, the tool detours where a straight line meets a singularity or a limit;
-    a warning has the location, the cause, and the cost in mm, mrad and s. With --physics, servos move the arms, fingers
-    hold by friction, and parts fall; measured.csv has what the servos measured. With --trials, many cases of the cell
-    are drawn, and the share of success is reported, with the causes of failure; --trial repeats one of them.
+    disk and shows the arm moving; with --log a log of it all for viewers of robot data. With --around, the tool detours
+    where a straight line meets a singularity or a limit; a warning has the location, the cause, and the cost in mm,
+    mrad and s. With --physics, servos move the arms, fingers hold by friction, and parts fall; measured.csv has what
+    the servos measured. With --trials, many cases of the cell are drawn, and the share of success is reported, with the
+    causes of failure; --trial repeats one of them.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -108,6 +111,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.program.vm.machine import Limits, RunError
     from armwright.report.run_files import RunInputs
 
+    check_log(log, output if trials is None else None)
     warn_of_stray(program)
     loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json)
     if loaded.cell is None:
@@ -163,7 +167,9 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
             raise
         error, recording = stopped, stopped.recording()
     verdict = None if single is None else single.verdict(recording.duration, error)
-    _finish(recording, loaded.diagnostics, inputs, output, error, verdict=verdict, as_json=as_json, quiet=quiet)
+    _finish(
+        recording, loaded.diagnostics, inputs, output, error, log=log, verdict=verdict, as_json=as_json, quiet=quiet
+    )
 
 
 def _finish(
@@ -173,6 +179,7 @@ def _finish(
     output: Path | None,
     error: "RunError | None",
     *,
+    log: "LogFormat | None",
     verdict: "TrialVerdict | None",
     as_json: bool,
     quiet: bool,
@@ -189,7 +196,7 @@ def _finish(
     result = RunSummary(recording=recording, diagnostics=diagnostics, hint=hint)
     notes = omission_notes(recording, inputs.motion_rows) if output is not None else ()
     if output is not None:
-        write_run(output, recording, diagnostics, inputs)
+        write_run(output, recording, diagnostics, inputs, log)
     if as_json:
         folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}

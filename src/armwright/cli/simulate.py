@@ -1,14 +1,19 @@
 """``armwright simulate``: simulate the motion of an arm with its drives off or holding its weight."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Option
 
 from armwright.cli.numbers import within
-from armwright.cli.options import ArmName, Json, OutputFolder
+from armwright.cli.options import ArmName, Json, Log, OutputFolder, check_log
 from armwright.cli.output import print_result
 from armwright.cli.results import write_results
 from armwright.cli.tool_options import Load, read_payload
+
+if TYPE_CHECKING:
+    from armwright.files.output import Content
+    from armwright.report.log_files import LogFormat
+    from armwright.simulation.result import Simulation
 
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -26,11 +31,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     step_ms: Annotated[float, Option(help="Step of Runge-Kutta-Gill, and period of the rows, in ms.")] = 1.0,
     load: Load = None,
     output: OutputFolder = None,
+    log: Log = None,
     as_json: Json = False,
 ) -> None:
     """Simulate the free response of an arm with friction, stops and gravity, and print its energy balance.
 
-    With -o the command writes motion.csv.
+    With -o the command writes motion.csv, and with --log a log for viewers of robot data.
 
     **Example:** `armwright simulate puma560 -q 0,0,90,0,0,0 --duration 2`
     """
@@ -42,6 +48,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.simulation.integrators import Adaptive, Gill
     from armwright.simulation.simulator import simulate as run
 
+    check_log(log, output)
     model = load_arm(arm)
     if load is not None:
         body = read_payload(load)
@@ -58,5 +65,13 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     if output is not None:
         s = simulation
-        write_results(output, {"motion.csv": motion_csv(s.t, s.q, s.qd, s.qdd, s.tau)})
+        logged = {} if log is None else _log_files(s, log)
+        write_results(output, {"motion.csv": motion_csv(s.t, s.q, s.qd, s.qdd, s.tau), **logged})
     print_result(simulation, as_json=as_json)
+
+
+def _log_files(simulation: "Simulation", log: "LogFormat") -> "dict[str, Content]":
+    from armwright.report.log_content import simulation_log_content
+    from armwright.report.log_files import log_files
+
+    return log_files(log, simulation_log_content(simulation))

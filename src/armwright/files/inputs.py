@@ -87,7 +87,7 @@ def read_pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
         # A file such as those of /proc may make its reader wait for ever though it is a regular one; a pipe shall wait.
         waits = 0 if not stat.S_ISREG(path.stat().st_mode) else os.O_NONBLOCK
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | waits)
-        _SOURCES[path.absolute()] = None
+        note_source(path)
         try:
             size = os.fstat(handle).st_size
             if size > most:
@@ -137,6 +137,11 @@ def forget_read_files() -> None:
     """Forget what was read, as a new process does."""
     _HASHES_OF_READ_FILES.clear()
     _SOURCES.clear()
+
+
+def note_source(path: Path) -> None:
+    """Take note that this process reads a file, so that no results take its place."""
+    _SOURCES[path.absolute()] = None
 
 
 def is_source(path: Path) -> bool:

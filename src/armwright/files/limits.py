@@ -79,6 +79,11 @@ LIMITS: Mapping[str, Limit] = {
     "gltf_values": Limit(1_000_000, "values", "values in the JSON of a glTF file"),
     "step_s": Limit(60, "s", "computing time for the triangles of a STEP file"),
     "step_mb": Limit(4000, "MB", "memory of the process that reads a STEP file"),
+    "log_mb": Limit(4000, "MB", "size of a file of a log, in MCAP or a bag of ROS 2"),
+    "log_record_mb": Limit(256, "MB", "a record of such a file: a message, or the unpacked content of a chunk"),
+    "log_unpacked_mb": Limit(16_000, "MB", "unpacked content of all chunks of such a file together"),
+    "log_records": Limit(20_000_000, "records", "records of such a file, whatever they hold"),
+    "log_rows": Limit(2_000_000, "joint states", "joint states of a log, of all its topics together"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }

@@ -34,7 +34,7 @@ FORMAT = "armwright results 1"
 # What results are called: a record is data, and only what has such a name is ever removed because a record names it.
 _RESULT_NAMES = re.compile(
     r"(motion|measured|samples|path|corners|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|"
-    r"report\.html|arm\.(toml|urdf)|camera\.toml|move\.(gif|mp4)|"
+    r"report\.html|arm\.(toml|urdf)|(log|bag)\.mcap|metadata\.yaml|calibration\.conf|kinematics\.yaml|camera\.toml|move\.(gif|mp4)|"
     r"(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|verification|bearings|error|"
     r"spectrum|forces|energy)\.svg|seen-\d+\.png|ARM_\d+\.(csv|trajectory\.yaml|goal\.yaml)|(events|proof)\.json|"
     r"[A-Za-z]\w*\.(script|src|mod)"

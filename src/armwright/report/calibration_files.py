@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arm.write import toml_text
 from armwright.calibration.assessment import CalibrationAssessment
-from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf
+from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf, robot_files
 from armwright.report.calibration_page import calibration_page, length_residuals
 from armwright.report.figures import Drawing, empty_figure, plain_axes, plain_label, svg_text
 
@@ -28,6 +28,8 @@ _CONTENTS = {
     "dh_standard.csv": "Denavit-Hartenberg parameters of arm.toml, standard convention",
     "dh_modified.csv": "Denavit-Hartenberg parameters of arm.toml, modified convention",
     "dh_hayati.csv": "parameters of arm.urdf with rotations about y",
+    "calibration.conf": "differences from the model, as controllers of Universal Robots keep them",
+    "kinematics.yaml": "frames of the joints for ROS 2, as kinematics_params_file of ur_description",
     "errors.json": "every error with its interval, the covariance, residuals before and after",
     "residuals.svg": "residuals of each reading",
     "distances.svg": "distances before and after, sorted",
@@ -54,6 +56,7 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
         "arm.toml": f"# {assessment.arm.name} {how}\n{toml_text(corrected_arm(assessment.tabular))}\n",
         "arm.urdf": corrected_urdf(assessment.full),
         **{f"dh_{name}.csv": text for name, text in tables.items()},
+        **robot_files(assessment.full),
         "errors.json": json.dumps(assessment.as_data(), indent=2) + "\n",
         **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
     }

@@ -126,7 +126,7 @@ class _Writer:
     def _node(self, name: str, X: Array, parent: int, mesh: int | None = None) -> int:
         """Add a node with poses (1, 4, 4) or (M, 4, 4) seen from its parent."""
         number = len(self._nodes)
-        rotations, places = _quaternions(X[:, :3, :3]), X[:, :3, 3]
+        rotations, places = quaternions(X[:, :3, :3]), X[:, :3, 3]
         self._nodes.append(
             {
                 "name": name,
@@ -211,7 +211,7 @@ def part_poses(part: MovedPart, t: Array, tools: Mapping[str, Array]) -> Array:
     return poses
 
 
-def _quaternions(R: Array) -> Array:
+def quaternions(R: Array) -> Array:
     """Return rotations (M, 3, 3) as quaternions x, y, z, w, each on the side of the one before: the short way."""
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - takes 50 ms
 

@@ -264,7 +264,7 @@ class RunPage:
         animation: the data of the view; None without a view.
         pictures: that cameras took, in order.
         clearance: smaller distances of stages are marked [m].
-        text_kind: kind of the text, ``Program`` or ``Poses``.
+        text_kind: kind of the text, ``Program``, ``Poses``, or ``Topics`` of a log.
         collisions: whether they were checked, and how near the arms came to other bodies.
         physics: the engine with its seed, and the largest errors, in a cell with physics; empty in one without.
     """
@@ -284,7 +284,7 @@ class RunPage:
     animation: Animation | None = None
     pictures: Sequence[SeenPicture] = ()
     clearance: float = 0.0
-    text_kind: Literal["Program", "Poses"] = "Program"
+    text_kind: Literal["Program", "Poses", "Topics"] = "Program"
     collisions: str = NOT_CHECKED
     physics: str = ""
 

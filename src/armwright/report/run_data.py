@@ -48,7 +48,7 @@ def run_page_data(
     """
     source, cell, failure = recording.code.source, recording.cell, recording.failure
     stages, fewer_stages = _limit_items(recording.stages, MAX_LIST_ITEMS, "stages", "all in run.json")
-    animation, fewer_frames = _animation(recording)
+    animation, fewer_frames = run_animation(recording)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
     errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
@@ -146,9 +146,17 @@ def _least_distance(run: RunStage) -> LeastDistance | None:
     return LeastDistance(distance=it.distance, bound=it.bound, bodies=it.bodies, t=run.t0 + it.time)
 
 
-def _animation(recording: Recording) -> tuple[Animation, list[str]]:
-    """Return the animation, and notes on what it omits."""
-    fps = min(_FRAMES_PER_SECOND, _MAX_INSTANTS / max(recording.duration, 1e-9))
+def run_animation(
+    recording: Recording, fps: float = _FRAMES_PER_SECOND, most: int = _MAX_INSTANTS
+) -> tuple[Animation, list[str]]:
+    """Return the animation of a run, and notes on what it omits.
+
+    Args:
+        recording: the recording of the run.
+        fps: instants per second.
+        most: instants at most; of a long run they are farther apart.
+    """
+    fps = min(fps, most / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms, tree = recording.cell.arms, recording.tree
     planned = {s.arm: _rows_at(s, t) for s in recording.streams}

@@ -28,6 +28,8 @@ from armwright.program.vm.recording import (
     motion_csv_lines,
 )
 from armwright.report.collision_text import clearance_data, collision_text
+from armwright.report.log_content import run_log_content
+from armwright.report.log_files import LogFormat, log_files
 from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
 from armwright.report.run_scene import part_data, scene_data
@@ -65,7 +67,13 @@ class RunInputs:
     text: str | None = None
 
 
-def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnostic], origin: RunInputs) -> None:
+def write_run(
+    folder: Path,
+    recording: Recording,
+    diagnostics: Sequence[Diagnostic],
+    origin: RunInputs,
+    log: LogFormat | None = None,
+) -> None:
     """Write the files of a run and its record into a folder, all of them or none.
 
     Args:
@@ -73,12 +81,15 @@ def write_run(folder: Path, recording: Recording, diagnostics: Sequence[Diagnost
         recording: the recording of the run.
         diagnostics: diagnostics of compilation and run, with the error that ended it.
         origin: the inputs of the run; a program that was not read from a file is written too.
+        log: format of a log that is written too; None for none.
 
     Raises:
+        MissingExtraError: what writes the log is not installed.
         OutputError: the folder or a file cannot be written.
     """
     program = {} if origin.text is None else {origin.program.name: origin.text}
-    files = {**program, **run_files(recording, diagnostics, origin)}
+    logged = {} if log is None else log_files(log, run_log_content(recording))
+    files = {**program, **run_files(recording, diagnostics, origin), **logged}
     write_folder(folder, files, run_record(recording, diagnostics, origin))
 
 

@@ -37,7 +37,7 @@ def measured_motion(planned: Stream, measured: MeasuredStream) -> MeasuredMotion
         q=measured.q[rows],
         qd=measured.qd[rows],
         tau=measured.tau[rows],
-        error=_largest_between(error, rows),
+        error=largest_between(error, rows),
         worst=sizes.max(axis=0),
         worst_t=measured.t[sizes.argmax(axis=0)],
     )
@@ -55,7 +55,7 @@ def tracking_error(planned: Stream, measured: MeasuredStream) -> Array:
     return np.asarray(measured.q - np.stack(columns, axis=1))
 
 
-def _largest_between(values: Array, rows: npt.NDArray[np.intp]) -> Array:
+def largest_between(values: Array, rows: npt.NDArray[np.intp]) -> Array:
     """Return of each column (k, n) the value of the largest magnitude from each of these rows up to the next."""
     high, low = np.maximum.reduceat(values, rows), np.minimum.reduceat(values, rows)
     return np.where(-low > high, low, high)

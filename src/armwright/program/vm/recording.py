@@ -246,9 +246,13 @@ class Recording:
         """The frame tree at the end."""
         return self.trees[-1][1]
 
+    def traced_effects(self) -> list[Effect]:
+        """Return the effects of which the trace has a line each."""
+        return [effect for effect in self.effects if effect.kind not in _SILENT]
+
     def trace(self) -> list[str]:
         """Return the lines of the trace."""
-        return [effect.text for effect in self.effects if effect.kind not in _SILENT]
+        return [effect.text for effect in self.traced_effects()]
 
     def _repr_html_(self) -> str:
         """Show what happened, effect by effect."""

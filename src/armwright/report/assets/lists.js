@@ -1,8 +1,8 @@
 // Lists that follow the time: program, what happened, the tree of frames.
 
-// Comments of a program are { ... } over any number of lines, and // to the end of one; those of a file of poses # to
+// Comments of a program are { ... } over any number of lines, and // to the end of one; those of poses and of topics # to
 // the end of a line.
-const COMMENTS = { Program: /(\{[^}]*\}?|\/\/[^\r\n]*)/, Poses: /(#[^\r\n]*)/ };
+const COMMENTS = { Program: /(\{[^}]*\}?|\/\/[^\r\n]*)/, Poses: /(#[^\r\n]*)/, Topics: /(#[^\r\n]*)/ };
 
 function codeLines(text) {
   const lines = [[]];
