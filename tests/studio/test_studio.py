@@ -16,6 +16,7 @@ from armwright.physics.world import PhysicsCell
 from armwright.program.api import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.studio.cell_file import CellFile
+from armwright.studio.live_arm import LiveArm, Solution
 from armwright.studio.program_text import ProgramText
 from armwright.studio.project import Project
 from armwright.studio.studio import Studio
@@ -60,6 +61,44 @@ class Pages:
     def tool(self) -> np.ndarray:
         """The pose of the tool in the world."""
         return self.studio.workbench.arms["ARM_1"].tool
+
+
+TWO_ARMS = """
+[arms.ARM_1]
+model = "puma560"
+joint_positions = [0, 0, 0, 0, 1, 0]
+
+[arms.ARM_2]
+model = "puma560"
+joint_positions = [0, 0, 0, 0, 1, 0]
+base = [1, 0, 0,  0, 1, 0,  0, 0, 1,  3, 0, 0]
+"""
+
+
+def test_worked_out_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one page has been shown is not worked out again for another, nor for an arm that stands."""
+    pages = Pages(tmp_path, "", TWO_ARMS)
+    pages.studio.page_opened(2)
+    worked_out: list[str] = []
+    solutions = LiveArm.solutions
+
+    def counted(arm: LiveArm) -> list[Solution]:
+        worked_out.append(arm.name)
+        return solutions(arm)
+
+    monkeypatch.setattr(LiveArm, "solutions", counted)
+    pages.state()
+    pages.state(page=2)
+    assert worked_out == ["ARM_1", "ARM_2"]
+    assert not pages.send("joint", arm="ARM_2", joint=1, value=0.4)
+
+    first, second = pages.state()["arms"], pages.state(page=2)["arms"]
+
+    assert worked_out == ["ARM_1", "ARM_2", "ARM_2"]
+    assert first == second
+    assert first["ARM_2"]["q"][0] == 0.4
+    assert not pages.send("grip", arm="ARM_1", open=False)
+    assert [pages.state(page)["arms"]["ARM_1"]["grip"] for page in (1, 2)] == [0.0, 0.0]
 
 
 CELL = """\

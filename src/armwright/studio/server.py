@@ -198,8 +198,10 @@ class Server:
         with contextlib.suppress(ConnectionClosed):
             while True:
                 await page.waiting.wait()
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(page.may_send.wait(), _PATIENCE)
+                if not page.may_send.is_set():
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(_PATIENCE):
+                            await page.may_send.wait()
                 page.waiting.clear()
                 page.may_send.clear()
                 await page.socket.send(self._state_text(page))
