@@ -17,7 +17,7 @@ from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.revolutions import joint_distances
 from armwright.kinematics.inverse_kinematics.solution import violations_of
-from armwright.kinematics.inverse_kinematics.solve import forearm_ahead, label
+from armwright.kinematics.inverse_kinematics.solve import label
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.kinematics.singularity_analysis import determinant_factors, singularities
@@ -348,8 +348,8 @@ def _labels(geometry: ClosedFormGeometry, q: Array) -> list[str]:
     side, second, flip = (np.where(factor >= 0, 1, -1).tolist() for factor in determinant_factors(geometry, angles))
     # The factor of an elbow falls where its angle grows.
     sign = 1 if geometry.family == "stanford" else -1
-    ahead = forearm_ahead(geometry, angles).tolist()
-    return [label(geometry, (side[i], sign * second[i], flip[i]), ahead[i]) for i in range(len(q))]
+    rows = np.array(angles).T.tolist()
+    return [label(geometry, (side[i], sign * second[i], flip[i]), row) for i, row in enumerate(rows)]
 
 
 def _direction_text(twist: Array) -> str:

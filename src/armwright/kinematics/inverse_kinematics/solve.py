@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -19,8 +20,7 @@ from armwright.kinematics.inverse_kinematics.recognise import closed_form_geomet
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
-from armwright.tracing.scalar import Scalar, select
-from armwright.tracing.vectors import Vector
+from armwright.tracing.scalar import select
 
 # Joint positions closer than this are the same configuration.
 _SAME_CONFIGURATION = 1e-9
@@ -86,30 +86,20 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
     return numeric_inverse(arm, X, reference) if geometry is None else _closed(arm, geometry, X, reference)
 
 
-def forearm_ahead(geometry: ClosedFormGeometry, angles: Vector) -> Scalar:
-    """Return how far ahead of joint 2 the end of the forearm is, for angles of the build, over abstract scalars."""
-    upper, _ = rotated_about_y(angles[1], geometry.upper_arm, 0.0)
-    fore, _ = rotated_about_y(angles[1] + angles[2], *geometry.forearm)
-    return upper + fore
-
-
-def label(geometry: ClosedFormGeometry, signs: Signs, ahead: float) -> str:
+def label(geometry: ClosedFormGeometry, signs: Signs, angles: Array | Sequence[float]) -> str:
     """Name a branch: arm, elbow or slide, wrist.
 
     The elbow is up where it is above the line from joint 2 to the end of the forearm, above as the axis of joint 1
     points. The wrist of a ``parallel`` arm is up where the angle 5 of its build is positive.
-
-    Args:
-        geometry: the build.
-        signs: of the branch.
-        ahead: ``forearm_ahead``; it is not looked at where the arm has a slide.
     """
     side, second, flip = signs
     arm = "left" if side > 0 else "right"
     if geometry.family == "stanford":
         return f"{arm}, {'out' if second > 0 else 'back'}, {'no-flip' if flip > 0 else 'flip'}"
+    upper, _ = rotated_about_y(angles[1], geometry.upper_arm, 0.0)
+    fore, _ = rotated_about_y(angles[1] + angles[2], *geometry.forearm)
     # With the wrist behind joint 2, as it is with the arm to the right, elbow above and elbow below change places.
-    elbow = "up" if second * ahead > 0 else "down"
+    elbow = "up" if second * (upper + fore) > 0 else "down"
     if geometry.family == "parallel":
         return f"shoulder {arm}, elbow {elbow}, wrist {'up' if flip > 0 else 'down'}"
     return f"{arm}, {elbow}, {'no-flip' if flip > 0 else 'flip'}"
@@ -155,8 +145,8 @@ def _closed(arm: Arm, geometry: ClosedFormGeometry, X: Array, near: Array) -> In
                 q = counter_rotate_within_limits(arm, q, near, members, joint=joint, other=_FREE[kind][-1][-1])
             else:
                 q = search_within_limits(arm, q, near, members, joint=joint)
-        ahead = forearm_ahead(geometry, geometry.angles(q.tolist()))
-        candidates.append(Candidate(q, label(geometry, BRANCHES[i], ahead), tuple(sorted(moving))))
+        angles = np.array(geometry.angles(q.tolist()))
+        candidates.append(Candidate(q, label(geometry, BRANCHES[i], angles), tuple(sorted(moving))))
     return rank(arm, X, candidates, near, apart=_SAME_CONFIGURATION, X_near=X_near)
 
 
