@@ -212,9 +212,11 @@ class Server:
 
     async def _tick(self) -> None:
         """Let what moves by itself go on."""
-        before = time.monotonic()
+        before = due = time.monotonic()
         while True:
-            await asyncio.sleep(_TICK)
+            # As often as that, whatever a tick takes; what has been missed is not made up for.
+            due = max(due + _TICK, time.monotonic())
+            await asyncio.sleep(due - time.monotonic())
             now = time.monotonic()
             if self.studio.tick(now, min(now - before, _LONGEST_TICK)):
                 self._changed()
