@@ -614,12 +614,12 @@ def test_a_run_that_fails(tmp_path: Path) -> None:
 
 def test_what_is_kept_of_a_run(pages: Pages) -> None:
     """The page, the 3-D file and the film of a run."""
-    assert pages.send("keep", what="page", arm="ARM_1") == "no program runs"
+    assert pages.send("keep", what="page") == "no program runs"
     pages.send("run")
     pages.wait(6.0)
     beginnings = {"page": b"<!DOCTYPE html>", "gltf": b"glTF", "gif": b"GIF8"}
     for what in beginnings:
-        assert pages.send("keep", what=what, arm="ARM_1") == ""
+        assert pages.send("keep", what=what) == ""
     names = set()
     for (page, job), beginning in zip(pages.studio.take_jobs(), beginnings.values(), strict=True):
         made = job()["download"]
@@ -629,15 +629,26 @@ def test_what_is_kept_of_a_run(pages: Pages) -> None:
     assert len(names) == 3
 
 
+def test_a_film_that_nobody_waits_for(pages: Pages) -> None:
+    """A film is not drawn to its end when the studio ends meanwhile."""
+    pages.send("run")
+    pages.wait(6.0)
+    assert pages.send("keep", what="gif") == ""
+    pages.studio.has_ended = True
+
+    assert [job() for _, job in pages.studio.take_jobs()] == [None]
+    assert pages.state()["refusal"] == "the studio has ended"
+
+
 def test_what_cannot_be_made(pages: Pages) -> None:
     """A message that cannot be made is refused in words, whatever went wrong; a few wait at once, and no more."""
     pages.send("run")
     pages.wait(6.0)
-    refusals = [pages.send("keep", what="page", arm="ARM_1") for _ in range(10)]
+    refusals = [pages.send("keep", what="page") for _ in range(10)]
     assert refusals == [""] * 8 + ["too much is being made already; wait a moment"] * 2
     run = pages.studio.project.run
     assert run is not None
     run.recording = lambda: 1 / 0  # type: ignore[method-assign,assignment,return-value]
     assert [job() for _, job in pages.studio.take_jobs()] == [None] * 8
     assert "ZeroDivisionError" in pages.state()["refusal"]
-    assert pages.send("keep", what="page", arm="ARM_1") == ""
+    assert pages.send("keep", what="page") == ""

@@ -3,6 +3,7 @@
 import gc
 import json
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,11 +54,16 @@ def studio(
         gc.enable()
     gc.freeze()
     try:
-        serve(served, lambda address: _announce(address, open_it=open_browser), port)
+        ended = serve(served, lambda address: _announce(address, open_it=open_browser), port)
     except OSError as error:
         raise usage_error("--port", f"port {port} cannot be listened on: {error.strerror or error}") from error
     for name in served.project.unsaved():
         typer.echo(f"armwright: the changes of {name} were not saved", err=True)
+    if not ended:
+        # Python would wait for what is still being computed, of which nothing is kept.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
 
 
 def _studio(cell: str, program: Path | None, new: Path | None) -> "Studio":

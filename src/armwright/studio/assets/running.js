@@ -121,7 +121,7 @@ function startRunning() {
   for (const button of document.querySelectorAll("[data-keep]"))
     button.addEventListener("click", () => {
       byId("export-text").textContent = "being made";
-      send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name });
+      send({ do: "keep", what: button.dataset.keep });
     });
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
