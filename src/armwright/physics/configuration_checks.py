@@ -32,7 +32,7 @@ class NearBodies(NamedTuple):
 
     Attributes:
         names: of both.
-        distance: between them [m]; below 0 where they overlap.
+        distance: between them [m]; below 0 where they overlap, by how far one has to be moved.
     """
 
     names: tuple[str, str]
@@ -75,6 +75,8 @@ class ConfigurationChecks:
 
     def nearest(self, configurations: Mapping[str, Array], within: float) -> NearBodies | None:
         """Return the two bodies that are nearest at one configuration (n,) of each arm; None where none are so near.
+
+        Of bodies that overlap those are the nearest that are deepest in one another.
 
         Args:
             configurations: of each arm.
@@ -132,8 +134,8 @@ class ConfigurationChecks:
         for ball, box in (pairs, pairs[::-1]):
             away = positions[:, ball] - positions[:, box]
             inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
-            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
-            np.maximum(
-                bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._checker.radii[ball], out=bounds
-            )
+            beyond = np.abs(inside) - self._boxes[box]
+            # A centre inside the box is as deep in it as the nearest face is away.
+            apart = np.linalg.norm(np.maximum(beyond, 0.0), axis=2) + np.minimum(beyond.max(axis=2), 0.0)
+            np.maximum(bounds, apart - self._around[box] - self._checker.radii[ball], out=bounds)
         return bounds
