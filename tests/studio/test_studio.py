@@ -572,6 +572,52 @@ def test_imports(pages: Pages) -> None:
     assert "none.toml" in pages.state()["program"]["diagnostics"][0]["text"]
 
 
+def without_names(folder: Path) -> Pages:
+    """A studio whose cell file and program have no names yet."""
+    pages = Pages(folder, program="")
+    pages.file = CellFile(folder / "suggested.toml", CELL)
+    pages.studio = Studio(Project(Workbench(pages.file.cell), pages.file))
+    pages.studio.workbench.warm_up()
+    pages.studio.page_opened(1)
+    return pages
+
+
+def test_a_first_save_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that could not be written has no name yet: it is asked for again, and may be another one."""
+    pages = without_names(tmp_path)
+    pages.send("text", text=PROGRAM, version=0)
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    for what in ("cell", "program"):
+        assert "cannot write" in pages.send("save", what=what, name="first")
+    state = pages.state()
+    assert (state["file"]["named"], state["program"]["named"], state["program"]["changed"]) == (False, False, True)
+
+    monkeypatch.chdir(tmp_path)
+    for what in ("cell", "program"):
+        assert pages.send("save", what=what, name="second") == ""
+    state = pages.state()
+    assert (state["file"]["name"], state["program"]["name"]) == ("second.toml", "second.rlo")
+    assert (tmp_path / "second.rlo").read_text() == PROGRAM
+    assert (tmp_path / "second.toml").read_text() == CELL
+
+
+def test_imports_of_a_program_that_gets_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program that gets its name when it is saved IMPORTs what lies beside it from then on."""
+    monkeypatch.chdir(tmp_path)
+    pages = without_names(tmp_path)
+    (tmp_path / "more.toml").write_text("[frames]\nASIDE = [1, 0, 0, 0, -1, 0, 0, 0, -1, 0.45, -0.2, 0.2]\n")
+    text = "IMPORT 'more.toml' ;\nBEGIN MOVE ARM_1 TO ASIDE END.\n".replace("'", '"')
+    pages.send("text", text=text, version=0)
+    assert pages.send("save", what="program", name="named") == ""
+
+    assert pages.send("run", rate=8.0) == ""
+    pages.wait(2.0)
+    assert pages.state()["run"]["reason"] == "end"
+    np.testing.assert_allclose(pages.tool[:3, 3], [0.45, -0.2, 0.2], atol=1e-6)
+
+
 def test_ends_of_lines(tmp_path: Path) -> None:
     """A file keeps its ends of lines; pages know one."""
     pages = Pages(tmp_path, program="")

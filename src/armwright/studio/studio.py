@@ -318,7 +318,7 @@ class Studio:
         breakpoints = sorted(project.breakpoints)
         return {
             "around": (bench.around_key, bench.around_state),
-            "file": (None if file is None else (file.text, file.changed), project.file_state),
+            "file": (None if file is None else (file.text, file.changed, file.named), project.file_state),
             "program": (
                 (program.compilations, program.changed, tuple(breakpoints)),
                 lambda: {**program.state(), "breakpoints": breakpoints},
