@@ -150,8 +150,10 @@ function startRunning() {
       one.tabIndex = one === tab ? 0 : -1;
       byId(one.getAttribute("aria-controls")).hidden = one !== tab;
     }
-    // Compared motions are in the view while the tab of runs is open.
+    // Compared motions are in the view while the tab of runs is open, whose charts are not drawn before.
     drawSoon();
+    paintStrip();
+    paintComparison();
   };
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => choose(tab));
