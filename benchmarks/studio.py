@@ -66,11 +66,15 @@ def cell_text(name: str, parts: int, arms: int = 1) -> str:
 def studio(*arguments: str):  # noqa: ANN201 - a script
     """Run a studio; give its process, its address, and the times since it began [s] when the address was there."""
     cores = sorted(_all_cores())
+    # Modules are compiled once, as when they are installed, whatever the shell says.
+    environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(Path(tempfile.gettempdir()) / "armwright-studio-modules")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     began = time.perf_counter()
     process = subprocess.Popen(
         [sys.executable, "-m", "armwright", "studio", *arguments],
         stdout=subprocess.PIPE,
         text=True,
+        env=environment,
         preexec_fn=lambda: os.sched_setaffinity(0, {cores[0]}),  # noqa: PLW1509 - one thread
     )
     try:

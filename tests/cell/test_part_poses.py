@@ -126,3 +126,29 @@ def test_the_camera_sees_where_it_is(cell: Cell) -> None:
     assert simulator.part_poses().carrier("BLOCK") == "ARM_1"
     assert copied.part_poses().carrier("BLOCK") is None
     np.testing.assert_allclose(simulator.locate("OBJ", 1.0)[0], block.pose @ block.grasp, atol=1e-9)
+
+
+def test_parts_that_are_said_to_be_somewhere(cell: Cell, rng: np.random.Generator) -> None:
+    """Parts that are arranged as others are go on as those do: carried, released and held again, with open fingers."""
+    grasp, later = hands(at_grasp(cell, (0.01, 0.0, 0.0))), hands(random_pose(rng))
+    parts = PartPoses(cell)
+    parts.close("ARM_1", grasp, 1.0)
+    said = {"BLOCK": (parts.carrier("BLOCK"), np.array(parts.pose("BLOCK")))}
+    openings = {name: parts.opening(name) for name in cell.arms}
+
+    arranged = PartPoses.arranged(cell, said, openings)
+
+    assert arranged.held_by("ARM_1") == ("BLOCK",)
+    assert [arranged.opening(name) for name in cell.arms] == [parts.opening(name) for name in cell.arms]
+    np.testing.assert_array_equal(arranged.in_world("BLOCK", later), parts.in_world("BLOCK", later))
+    # Neither what was said nor what was copied from is changed by what happens later.
+    said["BLOCK"][1][:3, 3], openings["ARM_1"] = 0.0, 0.0
+    for each in (arranged, parts):
+        assert each.open("ARM_1", later, 2.0) == ("BLOCK",)
+    np.testing.assert_array_equal(arranged.in_world("BLOCK", later), parts.in_world("BLOCK", later))
+    assert arranged.carrier("BLOCK") is None
+    at_part = hands(arranged.in_world("BLOCK", later) @ cell.parts["BLOCK"].grasp)
+    assert arranged.close("ARM_1", at_part, 3.0) == "BLOCK"
+    # In the world a part stands at the pose that is said.
+    X = random_pose(rng)
+    np.testing.assert_array_equal(PartPoses.arranged(cell, {"BLOCK": (None, X)}, openings).in_world("BLOCK", later), X)

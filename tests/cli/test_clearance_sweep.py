@@ -53,6 +53,24 @@ def test_estimate_on_paths(folder: Path) -> None:
     assert set(found["predictable_until"]) == {"y1", "y3", "y7"}
 
 
+def test_pages(folder: Path, tmp_path: Path) -> None:
+    """A sweep has a page with the errors that it found, and an estimate one with its clearances."""
+    page = (folder / "report.html").read_text()
+    results = load(folder)
+    errors = results["y3_amp_dc"].to_numpy() / 2 * 1e3
+    assert f"<b>{errors.min():.3f} to {errors.max():.3f} mm</b><small>mean error on y3</small>" in page
+    assert "<b>64</b><small>linkages on 3 paths</small>" in page
+    options = ("--sweep", folder, "--noise-um", "2", "--json", "-o", tmp_path)
+
+    found = json.loads(armwright("clearance", "estimate", "five-bar", PATHS, *options).stdout)
+
+    assert {path.name for path in tmp_path.iterdir()} == {"report.html", "summary.json", "clearances.svg", "run.json"}
+    assert json.loads((tmp_path / "summary.json").read_text()) == found
+    page = (tmp_path / "report.html").read_text()
+    for pin, it in found["parameters"].items():
+        assert f"<b>{it['mean'] * 1e3:.3f} mm</b><small>clearance of {pin}" in page
+
+
 def test_interrupted_sweep(tmp_path: Path) -> None:
     """Who stops a sweep by Ctrl-C is told that what is finished is kept, and how it goes on."""
     few = ("--paths", "y1", "--replicates", "0")

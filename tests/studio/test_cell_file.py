@@ -39,7 +39,7 @@ def test_taught_frames(file: CellFile, sample: Sample) -> None:
         X, X_WP = random_pose(rng), read_cell(file.path).tree().world("FEEDER")
         file.teach(f"P{number}", X)
         file.teach(f"Q{number}", X, "FEEDER", X_WP)
-        file.save()
+        file.save(file.path)
         tree = read_cell(file.path).tree()
         for name in (f"P{number}", f"Q{number}"):
             np.testing.assert_allclose(tree.world(name), X, atol=2e-7)
@@ -52,7 +52,7 @@ def test_joint_targets(file: CellFile, sample: Sample) -> None:
     for number, rng in enumerate(sample.cases(100)):
         q = np.where(rng.random(6) < 0.2, upper, rng.uniform(lower, upper))
         file.teach_joints(f"j{number}", "ARM_1", q)
-        file.save()
+        file.save(file.path)
         np.testing.assert_allclose(read_cell(file.path).joint_targets[f"J{number}"].q, q, atol=1e-7)
     file.rename("J0", "home")
     with pytest.raises(TeachingError, match="HOME is taken already"):
@@ -70,7 +70,7 @@ def test_all_else_stays(file: CellFile) -> None:
     assert file.path.read_text() == TEXT
     added = [line for line in file.difference().splitlines()[2:] if line[:1] in "+-"]
     assert added == ["+NEW = [1, 0, 0,  0, 1, 0,  0, 0, 1,  0, 0, 0]"]
-    file.save()
+    file.save(file.path)
     assert [line for line in file.path.read_text().splitlines() if line not in TEXT.splitlines()] == [added[0][1:]]
     assert not file.changed
     assert file.difference() == ""
@@ -110,7 +110,7 @@ def test_refused(file: CellFile, tmp_path: Path) -> None:
     file.teach("NEW", np.eye(4))
     file.path.write_text(TEXT + "# by another program\n")
     with pytest.raises(OutputError, match="changed since it was read"):
-        file.save()
+        file.save(file.path)
     assert file.path.read_text().endswith("# by another program\n")
     other = tmp_path / "cell.json"
     other.write_text('{"arms": {"ARM_1": {"joint_positions": [0, 0, 0.3, 0, 0, 0]}}}')

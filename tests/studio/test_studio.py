@@ -16,6 +16,7 @@ from armwright.physics.world import PhysicsCell
 from armwright.program.api import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.studio.cell_file import CellFile
+from armwright.studio.live_arm import LiveArm, Solution
 from armwright.studio.program_text import ProgramText
 from armwright.studio.project import Project
 from armwright.studio.studio import Studio
@@ -60,6 +61,44 @@ class Pages:
     def tool(self) -> np.ndarray:
         """The pose of the tool in the world."""
         return self.studio.workbench.arms["ARM_1"].tool
+
+
+TWO_ARMS = """
+[arms.ARM_1]
+model = "puma560"
+joint_positions = [0, 0, 0, 0, 1, 0]
+
+[arms.ARM_2]
+model = "puma560"
+joint_positions = [0, 0, 0, 0, 1, 0]
+base = [1, 0, 0,  0, 1, 0,  0, 0, 1,  3, 0, 0]
+"""
+
+
+def test_worked_out_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one page has been shown is not worked out again for another, nor for an arm that stands."""
+    pages = Pages(tmp_path, "", TWO_ARMS)
+    pages.studio.page_opened(2)
+    worked_out: list[str] = []
+    solutions = LiveArm.solutions
+
+    def counted(arm: LiveArm) -> list[Solution]:
+        worked_out.append(arm.name)
+        return solutions(arm)
+
+    monkeypatch.setattr(LiveArm, "solutions", counted)
+    pages.state()
+    pages.state(page=2)
+    assert worked_out == ["ARM_1", "ARM_2"]
+    assert not pages.send("joint", arm="ARM_2", joint=1, value=0.4)
+
+    first, second = pages.state()["arms"], pages.state(page=2)["arms"]
+
+    assert worked_out == ["ARM_1", "ARM_2", "ARM_2"]
+    assert first == second
+    assert first["ARM_2"]["q"][0] == 0.4
+    assert not pages.send("grip", arm="ARM_1", open=False)
+    assert [pages.state(page)["arms"]["ARM_1"]["grip"] for page in (1, 2)] == [0.0, 0.0]
 
 
 CELL = """\
@@ -533,6 +572,52 @@ def test_imports(pages: Pages) -> None:
     assert "none.toml" in pages.state()["program"]["diagnostics"][0]["text"]
 
 
+def without_names(folder: Path) -> Pages:
+    """A studio whose cell file and program have no names yet."""
+    pages = Pages(folder, program="")
+    pages.file = CellFile(folder / "suggested.toml", CELL)
+    pages.studio = Studio(Project(Workbench(pages.file.cell), pages.file))
+    pages.studio.workbench.warm_up()
+    pages.studio.page_opened(1)
+    return pages
+
+
+def test_a_first_save_that_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that could not be written has no name yet: it is asked for again, and may be another one."""
+    pages = without_names(tmp_path)
+    pages.send("text", text=PROGRAM, version=0)
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    for what in ("cell", "program"):
+        assert "cannot write" in pages.send("save", what=what, name="first")
+    state = pages.state()
+    assert (state["file"]["named"], state["program"]["named"], state["program"]["changed"]) == (False, False, True)
+
+    monkeypatch.chdir(tmp_path)
+    for what in ("cell", "program"):
+        assert pages.send("save", what=what, name="second") == ""
+    state = pages.state()
+    assert (state["file"]["name"], state["program"]["name"]) == ("second.toml", "second.rlo")
+    assert (tmp_path / "second.rlo").read_text() == PROGRAM
+    assert (tmp_path / "second.toml").read_text() == CELL
+
+
+def test_imports_of_a_program_that_gets_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program that gets its name when it is saved IMPORTs what lies beside it from then on."""
+    monkeypatch.chdir(tmp_path)
+    pages = without_names(tmp_path)
+    (tmp_path / "more.toml").write_text("[frames]\nASIDE = [1, 0, 0, 0, -1, 0, 0, 0, -1, 0.45, -0.2, 0.2]\n")
+    text = "IMPORT 'more.toml' ;\nBEGIN MOVE ARM_1 TO ASIDE END.\n".replace("'", '"')
+    pages.send("text", text=text, version=0)
+    assert pages.send("save", what="program", name="named") == ""
+
+    assert pages.send("run", rate=8.0) == ""
+    pages.wait(2.0)
+    assert pages.state()["run"]["reason"] == "end"
+    np.testing.assert_allclose(pages.tool[:3, 3], [0.45, -0.2, 0.2], atol=1e-6)
+
+
 def test_ends_of_lines(tmp_path: Path) -> None:
     """A file keeps its ends of lines; pages know one."""
     pages = Pages(tmp_path, program="")
@@ -575,12 +660,12 @@ def test_a_run_that_fails(tmp_path: Path) -> None:
 
 def test_what_is_kept_of_a_run(pages: Pages) -> None:
     """The page, the 3-D file and the film of a run."""
-    assert pages.send("keep", what="page", arm="ARM_1") == "no program runs"
+    assert pages.send("keep", what="page") == "no program runs"
     pages.send("run")
     pages.wait(6.0)
     beginnings = {"page": b"<!DOCTYPE html>", "gltf": b"glTF", "gif": b"GIF8"}
     for what in beginnings:
-        assert pages.send("keep", what=what, arm="ARM_1") == ""
+        assert pages.send("keep", what=what) == ""
     names = set()
     for (page, job), beginning in zip(pages.studio.take_jobs(), beginnings.values(), strict=True):
         made = job()["download"]
@@ -590,15 +675,26 @@ def test_what_is_kept_of_a_run(pages: Pages) -> None:
     assert len(names) == 3
 
 
+def test_a_film_that_nobody_waits_for(pages: Pages) -> None:
+    """A film is not drawn to its end when the studio ends meanwhile."""
+    pages.send("run")
+    pages.wait(6.0)
+    assert pages.send("keep", what="gif") == ""
+    pages.studio.has_ended = True
+
+    assert [job() for _, job in pages.studio.take_jobs()] == [None]
+    assert pages.state()["refusal"] == "the studio has ended"
+
+
 def test_what_cannot_be_made(pages: Pages) -> None:
     """A message that cannot be made is refused in words, whatever went wrong; a few wait at once, and no more."""
     pages.send("run")
     pages.wait(6.0)
-    refusals = [pages.send("keep", what="page", arm="ARM_1") for _ in range(10)]
+    refusals = [pages.send("keep", what="page") for _ in range(10)]
     assert refusals == [""] * 8 + ["too much is being made already; wait a moment"] * 2
     run = pages.studio.project.run
     assert run is not None
     run.recording = lambda: 1 / 0  # type: ignore[method-assign,assignment,return-value]
     assert [job() for _, job in pages.studio.take_jobs()] == [None] * 8
     assert "ZeroDivisionError" in pages.state()["refusal"]
-    assert pages.send("keep", what="page", arm="ARM_1") == ""
+    assert pages.send("keep", what="page") == ""

@@ -6,8 +6,8 @@ from typing import Annotated
 from typer import Argument, Option
 
 from armwright.cli.linkages import LinkageName
-from armwright.cli.options import Json, usage_error
-from armwright.cli.output import print_result
+from armwright.cli.options import Json, OutputFolder, usage_error
+from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
@@ -24,20 +24,22 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
+    output: OutputFolder = None,
     as_json: Json = False,
 ) -> None:
     """Estimate the clearances of a linkage from readings of its tip at rest, or from its motion on paths.
 
     At rest a few poses suffice and no simulation is needed. On paths a sweep of simulations relates error curves to
     clearances. The result is a distribution: mean, 90 % interval, correlation, and which parameters are not
-    identifiable. Where no clearances explain the data none are reported, and the exit status is 3.
+    identifiable. Where no clearances explain the data none are reported, and the exit status is 3. With -o the command
+    writes summary.json, clearances.svg and a page, report.html.
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
     from armwright.clearance.estimation.assessment import assess_paths, assess_rest
     from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
     from armwright.clearance.reader import load_linkage
-    from armwright.cli.results import warn_of_stray
+    from armwright.cli.results import warn_of_stray, write_results
     from armwright.errors import InvalidValueError
 
     warn_of_stray(measured)
@@ -53,4 +55,8 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     else:
         with waiting(f"learning from the simulations in {sweep}") as progress:
             assessment = assess_paths(model, measurement, sweep, noise, progress)
-    print_result(assessment, as_json=as_json)
+    if output is not None:
+        from armwright.report.clearance_study_pages import estimate_files
+
+        write_results(output, estimate_files(assessment, name=model.name, command=command_line()))
+    print_result(assessment, as_json=as_json, output=output)

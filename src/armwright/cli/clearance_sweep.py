@@ -7,8 +7,10 @@ from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Json, Quiet
-from armwright.cli.output import print_result
+from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import sweep_bar, waiting
+
+_PAGE = "report.html"
 
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -48,7 +50,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     Beside each linkage a few copies are simulated whose clearances differ by a nanometre: the features are means over
     them, with their spread, and the command prints until when the runs are predictions. The same command resumes a
     sweep that was interrupted. `armwright clearance estimate` learns from the folder how the error curves depend on the
-    clearances.
+    clearances. The folder has a page too, report.html.
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
@@ -58,6 +60,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.sweep_summary import sweep_summary
+    from armwright.files.output import write_file
+    from armwright.report.clearance_study_pages import sweep_page
     from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
     from armwright.sweep.extras import check_extras
     from armwright.sweep.folder import RESULTS
@@ -94,4 +98,6 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
             raise
     with results:
         summary = sweep_summary(task, results, output)
+        page = sweep_page(summary, results, name=task.linkage.name, command=command_line())
+    write_file(output / _PAGE, page)
     print_result(summary, as_json=as_json, quiet=quiet, wrap=False)

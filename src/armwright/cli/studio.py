@@ -1,7 +1,9 @@
 """``armwright studio``: the workbench in a browser."""
 
+import gc
 import json
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
     from armwright.studio.cell_file import CellFile
+    from armwright.studio.studio import Studio
 
 _EMPTY = """name = {name}
 
@@ -41,8 +44,31 @@ def studio(
 
     **Example:** `armwright studio examples/vision_cell.toml examples/stack_by_vision.rlo`
     """
+    # What is loaded stays. Looking through it for what is not needed any more takes a tenth of the start.
+    gc.disable()
+    try:
+        from armwright.studio.server import serve
+
+        served = _studio(cell, program, new)
+    finally:
+        gc.enable()
+    gc.freeze()
+    try:
+        ended = serve(served, lambda address: _announce(address, open_it=open_browser), port)
+    except OSError as error:
+        raise usage_error("--port", f"port {port} cannot be listened on: {error.strerror or error}") from error
+    for name in served.project.unsaved():
+        typer.echo(f"armwright: the changes of {name} were not saved", err=True)
+    if not ended:
+        # Python would wait for what is still being computed, of which nothing is kept.
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
+
+
+def _studio(cell: str, program: Path | None, new: Path | None) -> "Studio":
+    """Return the studio of a cell and a program."""
     from armwright.studio.project import Project
-    from armwright.studio.server import serve
     from armwright.studio.studio import Studio
     from armwright.studio.workbench import Workbench
 
@@ -51,13 +77,7 @@ def studio(
         program = new.with_suffix(".rlo")
     if program is not None and program.resolve() == file.path.resolve():
         raise usage_error("PROGRAM", f"{program} is the cell file")
-    served = Studio(Project(Workbench(file.cell), file, program))
-    try:
-        serve(served, lambda address: _announce(address, open_it=open_browser), port)
-    except OSError as error:
-        raise usage_error("--port", f"port {port} cannot be listened on: {error.strerror or error}") from error
-    for name in served.project.unsaved():
-        typer.echo(f"armwright: the changes of {name} were not saved", err=True)
+    return Studio(Project(Workbench(file.cell), file, program))
 
 
 def _announce(address: str, *, open_it: bool) -> None:

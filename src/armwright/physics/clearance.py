@@ -154,6 +154,9 @@ class ClearanceChecker:
         a, b = self._pairs.T
         arms = np.array([body.arm or "" for body in bodies])
         links = np.array([body.link for body in bodies], dtype=np.intp)
+        self._solid_poses = np.array([body.solid.pose for body in bodies]).reshape(-1, 4, 4)
+        carried = {body.arm: np.flatnonzero(arms == body.arm) for body in bodies if body.arm is not None}
+        self._carried = {name: (numbers, links[numbers]) for name, numbers in carried.items()}
         # Two bodies of one arm are moved past each other by the joints between them only.
         self._of_one = (arms[a] == arms[b]) & (arms[a] != "")
         self._from = np.where(self._of_one, np.minimum(links[a], links[b]), 0)
@@ -270,9 +273,9 @@ class ClearanceChecker:
             frames: (k, n + 2, 4, 4) of each arm, or (1, n + 2, 4, 4) of one that stands.
         """
         poses = np.empty((max(map(len, frames.values()), default=1), len(self._bodies), 4, 4))
-        for number, body in enumerate(self._bodies):
-            pose = body.solid.pose
-            poses[:, number] = pose if body.arm is None else frames[body.arm][:, body.link] @ pose
+        poses[:] = self._solid_poses
+        for name, (numbers, links) in self._carried.items():
+            poses[:, numbers] = frames[name][:, links] @ self._solid_poses[numbers]
         return poses
 
     def nearest_points(self, motions: Mapping[str, Trajectory], time: float, bodies: tuple[int, int]) -> Array:

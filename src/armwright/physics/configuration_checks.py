@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.physics.clearance import ClearanceChecker
+from armwright.physics.clearance import ClearanceChecker, Numbers
 from armwright.physics.distances import TOLERANCE
 from armwright.spatial.shapes import box_about
 
@@ -32,7 +32,7 @@ class NearBodies(NamedTuple):
 
     Attributes:
         names: of both.
-        distance: between them [m]; below 0 where they overlap.
+        distance: between them [m]; below 0 where they overlap, by how far one has to be moved.
     """
 
     names: tuple[str, str]
@@ -47,6 +47,7 @@ class ConfigurationChecks:
         self._checker = checker
         self._pairs = np.array(checker.pairs, dtype=np.intp).reshape(-1, 2)
         boxes = [box_about(body.solid.shape) for body in checker.bodies]
+        self._two_balls = checker.radii[self._pairs].sum(axis=1)
         self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
         self._around = np.array([around for _, around in boxes])
 
@@ -75,6 +76,8 @@ class ConfigurationChecks:
     def nearest(self, configurations: Mapping[str, Array], within: float) -> NearBodies | None:
         """Return the two bodies that are nearest at one configuration (n,) of each arm; None where none are so near.
 
+        Of bodies that overlap those are the nearest that are deepest in one another.
+
         Args:
             configurations: of each arm.
             within: distance [m].
@@ -82,10 +85,12 @@ class ConfigurationChecks:
         if not len(self._pairs):
             return None
         poses = self._poses_at(configurations)
-        bounds = self._least_distances(poses)[0]
+        bounds = self._balls_apart(poses[0, :, :3, 3])
+        near = np.flatnonzero(bounds < within)
+        bounds[near] = self._least_distances(poses, near)[0]
         found: tuple[int, int] | None = None
         least, placed = within, set[int]()
-        for k in np.argsort(bounds).tolist():
+        for k in near[np.argsort(bounds[near])].tolist():
             if bounds[k] >= least:
                 break
             a, b = self._pairs[k].tolist()
@@ -116,15 +121,21 @@ class ConfigurationChecks:
         rows = {name: np.atleast_2d(q) for name, q in configurations.items()}
         return self._checker.body_poses(self._checker.link_frames(rows))
 
-    def _least_distances(self, poses: Array) -> Array:
+    def _balls_apart(self, positions: Array) -> Array:
+        """Return lower bounds (p,) of the distances of pairs whose bodies are at positions (b, 3): between balls."""
+        a, b = self._pairs.T
+        return np.asarray(np.linalg.norm(positions[a] - positions[b], axis=1) - self._two_balls)
+
+    def _least_distances(self, poses: Array, of: Numbers | slice = slice(None)) -> Array:
         """Return lower bounds (k, p) of the distances of pairs: from a ball about one body to a box about the other."""
-        bounds = np.full((len(poses), len(self._pairs)), -np.inf)
+        pairs = self._pairs[of].T
+        bounds = np.full((len(poses), pairs.shape[1]), -np.inf)
         positions, R = poses[:, :, :3, 3], poses[:, :, :3, :3]
-        for ball, box in (self._pairs.T, self._pairs.T[::-1]):
+        for ball, box in (pairs, pairs[::-1]):
             away = positions[:, ball] - positions[:, box]
             inside = np.einsum("kpi,kpij->kpj", away, R[:, box])
-            beyond = np.maximum(np.abs(inside) - self._boxes[box], 0.0)
-            np.maximum(
-                bounds, np.linalg.norm(beyond, axis=2) - self._around[box] - self._checker.radii[ball], out=bounds
-            )
+            beyond = np.abs(inside) - self._boxes[box]
+            # A centre inside the box is as deep in it as the nearest face is away.
+            apart = np.linalg.norm(np.maximum(beyond, 0.0), axis=2) + np.minimum(beyond.max(axis=2), 0.0)
+            np.maximum(bounds, apart - self._around[box] - self._checker.radii[ball], out=bounds)
         return bounds

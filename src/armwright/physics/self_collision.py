@@ -13,6 +13,7 @@ checked but
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import NamedTuple
 
@@ -116,20 +117,33 @@ class _Touching:
     """The bodies of an arm in random configurations."""
 
     def __init__(self, arm: Arm, solids: Sequence[Sequence[Solid]]) -> None:
-        self._solids = solids
+        self._arm, self._solids = arm, solids
         self._distances: Distances | None = None
         self._numbers: dict[tuple[int, int], int] = {}
-        self._frames = link_poses(arm, random_configurations(arm))
+        self._configurations = random_configurations(arm)
+
+    @cached_property
+    def _first(self) -> Array:
+        return self._frames(self._configurations[:_FIRST])
+
+    @cached_property
+    def _others(self) -> Array:
+        return self._frames(self._configurations[_FIRST:])
+
+    def _frames(self, configurations: Array) -> Array:
+        """Return the frames (k, n + 2, 4, 4) of all bodies at configurations (k, n)."""
+        frames = link_poses(self._arm, configurations)
         # What the tool holds is in the frame of the last link.
-        self._frames[:, arm.n + 1] = self._frames[:, arm.n]
+        frames[:, self._arm.n + 1] = frames[:, self._arm.n]
+        return frames
 
     def always(self, a: int, b: int) -> bool:
         """Whether two bodies touch in all configurations, to the resolution of motions."""
-        return self._all(a, b, slice(0, _FIRST)) and self._all(a, b, slice(_FIRST, CONFIGURATIONS))
+        return self._all(a, b, self._first) and self._all(a, b, self._others)
 
-    def _all(self, a: int, b: int, some: slice) -> bool:
-        """Whether two bodies touch in all of some configurations."""
-        frames_a, frames_b = self._frames[some, a], self._frames[some, b]
+    def _all(self, a: int, b: int, frames: Array) -> bool:
+        """Whether two bodies touch where their frames are (k, n + 2, 4, 4)."""
+        frames_a, frames_b = frames[:, a], frames[:, b]
         touch = np.zeros(len(frames_a), dtype=bool)
         unknown: list[tuple[tuple[int, int], tuple[int, int], Flags]] = []
         for i, solid in enumerate(self._solids[a]):
@@ -139,18 +153,18 @@ class _Touching:
                 if (maybe & ~surely).any():
                     unknown.append(((a, i), (b, j), maybe & ~surely))
         for k in np.flatnonzero(~touch).tolist():
-            if not any(maybe[k] and self._distance(first, second, some.start + k) for first, second, maybe in unknown):
+            if not any(maybe[k] and self._touch(first, second, frames[k]) for first, second, maybe in unknown):
                 return False
         return True
 
-    def _distance(self, first: tuple[int, int], second: tuple[int, int], k: int) -> bool:
-        """Whether two solids, each by its body and its number there, touch in a configuration."""
+    def _touch(self, first: tuple[int, int], second: tuple[int, int], frames: Array) -> bool:
+        """Whether two solids, each by its body and its number there, touch at frames (n + 2, 4, 4)."""
         if self._distances is None:
             every = [(body, i) for body, own in enumerate(self._solids) for i in range(len(own))]
             self._numbers = {key: number for number, key in enumerate(every)}
             self._distances = Distances([self._solids[body][i].shape for body, i in every])
         for body, i in (first, second):
-            self._distances.set_pose(self._numbers[body, i], self._frames[k, body] @ self._solids[body][i].pose)
+            self._distances.set_pose(self._numbers[body, i], frames[body] @ self._solids[body][i].pose)
         return self._distances.between(self._numbers[first], self._numbers[second], 2 * RESOLUTION) < RESOLUTION
 
 
@@ -173,7 +187,8 @@ def touch_bounds(one: Solid, other: Solid, frames: Array, others: Array) -> tupl
         frames: (k, 4, 4) poses of the frame of the first.
         others: (k, 4, 4) poses of that of the second.
     """
-    X, Y = frames @ one.pose, others @ other.pose
+    # One product of large matrices is faster than many of small ones.
+    X, Y = ((it.reshape(-1, 4) @ solid.pose).reshape(-1, 4, 4) for it, solid in ((frames, one), (others, other)))
     inner = _gap(_within(one.shape), X, _within(other.shape), Y)
     outer = _gap(_around(one.shape), X, _around(other.shape), Y)
     return inner < RESOLUTION, outer < RESOLUTION

@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 import math
 import struct
-from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
-from armwright.report.animation import Animation, ArmFigure, Body, MovedPart
-from armwright.spatial.poses import from_noap, homogeneous
+from armwright.report.animation import Animation, ArmFigure, Body
+from armwright.report.body_poses import body_change, frame_poses, part_poses
+from armwright.report.triangles import triangles_of
+from armwright.spatial.poses import from_noap
 from armwright.version import __version__
 
-# Sides of what is round, and rings of half a ball.
-_SIDES, _RINGS = 24, 6
 # Linear colours of bodies, by what colours them on a page.
 _TINTS = {
     "link": (0.42, 0.48, 0.56),
@@ -57,7 +56,7 @@ class _Writer:
         self._nodes: list[dict[str, Any]] = [{"name": "WORLD", "rotation": list(_UPRIGHT), "children": []}]
         self._samplers: list[dict[str, Any]] = []
         self._channels: list[dict[str, Any]] = []
-        self._triangles = [_triangles(shape) for shape in animation.shapes]
+        self._triangles = [triangles_of(shape) for shape in animation.shapes]
         self._times = self._accessor(animation.t.astype(np.float32), "SCALAR", bounds=True)
 
     def content(self) -> bytes:
@@ -104,10 +103,8 @@ class _Writer:
 
     def _add_body(self, body: Body, figure: ArmFigure, parent: int) -> None:
         X, mesh = from_noap(body.pose)[None], self._mesh(body.shape, body.tint)
-        if body.slide and figure.grip is not None:
-            offsets = np.zeros((len(figure.q), 3))
-            offsets[:, 1] = body.slide * figure.grip * figure.opening / 2
-            X = homogeneous(np.broadcast_to(np.eye(3), (len(offsets), 3, 3)), offsets) @ X
+        if body.slide:
+            X = body_change(body, figure) @ X
         node = self._node(body.name, X, parent, None if body.stretches else mesh)
         if body.stretches:
             # From a length of 1 m about its middle.
@@ -186,31 +183,6 @@ class _Writer:
         return len(self._accessors) - 1
 
 
-def frame_poses(figure: ArmFigure) -> list[Array]:
-    """Return the poses (M, 4, 4) of the frames 0 to n of an arm and of its tool in the world, over time."""
-    X = np.tile(from_noap(figure.base), (len(figure.q), 1, 1))
-    poses = [X]
-    for joint, values in zip(figure.joints, figure.q.T, strict=True):
-        angle = joint.theta + (values if joint.revolute else 0.0)
-        step = np.tile(np.eye(4), (len(values), 1, 1))
-        c, s = np.cos(angle), np.sin(angle)
-        step[:, 0, 0], step[:, 0, 1], step[:, 1, 0], step[:, 1, 1] = c, -s, s, c
-        step[:, 2, 3] = joint.d + (0.0 if joint.revolute else values)
-        X = X @ step @ from_noap(joint.behind)
-        poses.append(X)
-    return [*poses, X @ from_noap(figure.tool)]
-
-
-def part_poses(part: MovedPart, t: Array, tools: Mapping[str, Array]) -> Array:
-    """Return the poses (M, 4, 4) of a part in the world, over time."""
-    rows = np.maximum(np.searchsorted(part.times, t + 1e-6, side="right") - 1, 0)
-    poses = np.empty((len(t), 4, 4))
-    for i, row in enumerate(rows.tolist()):
-        X, arm = from_noap(part.poses[row]), part.arms[row]
-        poses[i] = X if arm is None else tools[arm][i] @ X
-    return poses
-
-
 def quaternions(R: Array) -> Array:
     """Return rotations (M, 3, 3) as quaternions x, y, z, w, each on the side of the one before: the short way."""
     from scipy.spatial.transform import Rotation  # noqa: PLC0415 - takes 50 ms
@@ -228,76 +200,3 @@ def _glb(document: bytes, buffer: bytes) -> bytes:
         whole = content + filler * (-len(content) % 4)
         chunks += struct.pack("<I", len(whole)) + kind + whole
     return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
-
-
-# ---- triangles -------------------------------------------------------------------------------------------------------
-
-
-def _triangles(
-    shape: Mapping[str, Any],
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
-    """Return vertices (k, 3), normals (k, 3) and faces (m, 3) of a shape, as of ``shape_table``."""
-    match shape["kind"]:
-        case "box":
-            vertices, normals, faces = _box(np.array(shape["size"], dtype=float))
-        case "cylinder":
-            r, h = shape["radius"], shape["length"] / 2
-            rings = [(0, -h, 0, -1), (r, -h, 0, -1), (r, -h, 1, 0), (r, h, 1, 0), (r, h, 0, 1), (0, h, 0, 1)]
-            vertices, normals, faces = _round(rings)
-        case "capsule" | "sphere":
-            vertices, normals, faces = _round(list(_capsule(shape["radius"], shape.get("length", 0.0))))
-        case _:
-            vertices, normals, faces = _flat(np.array(shape["vertices"]).reshape(-1, 3), np.array(shape["faces"]))
-    return vertices.astype(np.float32), normals.astype(np.float32), faces.astype(np.uint32)
-
-
-def _box(size: Array) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    vertices: list[Array] = []
-    normals: list[Array] = []
-    faces: list[int] = []
-    for axis in range(3):
-        for side in (-1, 1):
-            first = len(vertices)
-            for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-                corner = np.zeros(3)
-                corner[axis], corner[(axis + 1) % 3], corner[(axis + 2) % 3] = side, u, v
-                vertices.append(corner * size / 2)
-                normals.append(np.eye(3)[axis] * side)
-            order = (0, 1, 2, 0, 2, 3) if side > 0 else (0, 2, 1, 0, 3, 2)
-            faces += [first + i for i in order]
-    return np.array(vertices), np.array(normals), np.array(faces).reshape(-1, 3)
-
-
-def _capsule(radius: float, length: float) -> Iterator[tuple[float, float, float, float]]:
-    for side in (-1, 1):
-        for k in range(_RINGS + 1):
-            angle = (k - _RINGS if side < 0 else k) * math.pi / 2 / _RINGS
-            c, s = math.cos(angle), math.sin(angle)
-            yield radius * c, radius * s + side * length / 2, c, s
-
-
-def _round(rings: Sequence[tuple[float, float, float, float]]) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    """Return a surface of revolution about z: rings of radius, height, and radial and axial part of the normal."""
-    angles = np.linspace(0, 2 * math.pi, _SIDES + 1)
-    radial = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
-    vertices = np.concatenate([r * radial + (0, 0, z) for r, z, _, _ in rings])
-    normals = np.concatenate([out * radial + (0, 0, along) for _, _, out, along in rings])
-    wide = _SIDES + 1
-    faces = [
-        triangle
-        for j in range(len(rings) - 1)
-        for i in range(_SIDES)
-        for a, b in [(j * wide + i, (j + 1) * wide + i)]
-        for triangle in ((a, a + 1, b + 1), (a, b + 1, b))
-    ]
-    return vertices, normals, np.array(faces)
-
-
-def _flat(vertices: Array, faces: npt.NDArray[np.int64]) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    """Return a mesh whose triangles have corners of their own."""
-    corners = vertices[faces.reshape(-1)]
-    a, b, c = corners[0::3], corners[1::3], corners[2::3]
-    normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.where(lengths > 0, normals / np.where(lengths > 0, lengths, 1.0), (0.0, 0.0, 1.0))
-    return corners, np.repeat(normals, 3, axis=0), np.arange(len(corners)).reshape(-1, 3)

@@ -22,7 +22,8 @@ from armwright.errors import ArmwrightError
 from armwright.program.vm.recording import Recording
 from armwright.report.animation import Animation, ArmFigure, Body
 from armwright.report.arm_figure import Placed, arm_figure
-from armwright.report.gltf_motion import frame_poses, part_poses, quaternions
+from armwright.report.body_poses import frame_poses, part_poses
+from armwright.report.gltf_motion import quaternions
 from armwright.report.run_data import run_animation
 from armwright.report.shape_table import ShapeTable
 from armwright.simulation.result import Simulation

@@ -167,14 +167,14 @@ class CellFile:
         before, after = (text.splitlines(keepends=True) for text in (self._saved, self.text))
         return "".join(difflib.unified_diff(before, after, self.path.name, f"{self.path.name}, taught"))
 
-    def save(self) -> None:
-        """Write the text to the file.
+    def save(self, path: Path) -> None:
+        """Write the text to a file, which is its own from then on.
 
         Raises:
             OutputError: it cannot be written, or somebody else has changed it meanwhile.
         """
-        write_back(self.path, self._saved, self.text)
-        self._saved = self.text
+        write_back(path, self._saved, self.text)
+        self._saved, self.path, self.named = self.text, path, True
 
     # ---- the document --------------------------------------------------------------------------------------------
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from typing import Literal, NamedTuple, TypeAlias
 
-import numpy as np
-
-from armwright.arrays import Array
 from armwright.errors import ArmwrightError
 from armwright.program.vm.recording import Recording
 from armwright.report.gltf_motion import gltf_motion
-from armwright.report.movie import render_films
+from armwright.report.movie import render_gif
 from armwright.report.page import run_page
 from armwright.report.run_data import run_page_data
 
@@ -20,16 +18,6 @@ Kind: TypeAlias = Literal["page", "gltf", "gif"]
 
 class DownloadError(ArmwrightError, ValueError):
     """There is nothing to keep."""
-
-
-class _Played:
-    """The motion of an arm in a run, as a film needs it."""
-
-    def __init__(self, t: Array, q: Array) -> None:
-        self._t, self._q, self.duration = t, q, float(t[-1])
-
-    def __call__(self, t: Array) -> Array:
-        return np.asarray(self._q[np.clip(np.searchsorted(self._t, t), 0, len(self._t) - 1)])
 
 
 class Download(NamedTuple):
@@ -51,26 +39,28 @@ class Download(NamedTuple):
         return {"download": {"name": self.name, "type": self.type, "data": data}}
 
 
-def download(recording: Recording, kind: Kind, arm: str) -> Download:
+def download(recording: Recording, kind: Kind, has_ended: Callable[[], bool]) -> Download:
     """Return a file of a run.
 
     Args:
         recording: of the run.
-        kind: ``page``, the page of results; ``gltf``, a 3-D file that moves; ``gif``, a film of one arm.
-        arm: the arm of the film.
+        kind: ``page``, the page of results; ``gltf``, a 3-D file that moves; ``gif``, a film.
+        has_ended: asked again and again while a film is drawn, whether anybody still waits for it.
 
     Raises:
-        DownloadError: no time has gone by in the run.
+        DownloadError: no time has gone by in the run, or nobody waits any longer.
     """
     if recording.duration <= 0:
         raise DownloadError("nothing has moved yet that could be kept")
-    if kind == "gif":
-        stream = next(stream for stream in recording.streams if stream.arm == arm)
-        model = recording.cell.arms[arm].arm
-        films = render_films(model, _Played(stream.t, stream.q), np.empty((0, 4, 4)))  # type: ignore[arg-type]
-        return Download("motion.gif", "image/gif", films["move.gif"])
+
+    def go_on(_done: int, _all: int) -> None:
+        if has_ended():
+            raise DownloadError("the studio has ended")
+
     data = run_page_data(recording, (), "armwright studio")
     if kind == "page":
         return Download("report.html", "text/html", run_page(data).encode())
     assert data.animation is not None  # noqa: S101 - a run has one
+    if kind == "gif":
+        return Download("motion.gif", "image/gif", render_gif(data.animation, go_on))
     return Download("motion.glb", "model/gltf-binary", gltf_motion(data.animation))

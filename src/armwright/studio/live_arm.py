@@ -22,7 +22,7 @@ from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.kinematics.singularity_analysis import determinant_factors, singularities
-from armwright.spatial.poses import homogeneous, inverse
+from armwright.spatial.poses import homogeneous, inverse_pose
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 # A solution is one if its tool is as near to the pose [m], [rad].
@@ -45,7 +45,7 @@ _POSE = 6
 _MOST_STRIDES = 16
 # A stride is no shorter than this [m], [rad]: what leaps in one leaps.
 _STRIDE, _TURN = 0.03, math.radians(10.0)
-# Poses are the same within this: of the configuration that was found for one.
+# A joint that is beyond its limit by no more than this is on it [rad], [m].
 _SAME = 1e-9
 
 Level: TypeAlias = Literal["warning", "error"]
@@ -108,8 +108,9 @@ class LiveArm:
         self._leap = np.where(revolute, _LEAP_ANGLE, _LEAP_LENGTH)
         self._near = np.where(revolute, _NEAR_ANGLE, _NEAR_LENGTH)
         self._form = find_closed_form(placed.arm)
-        # A pose, and the configurations that bring the tool there.
-        self._latest: tuple[Array, Array] = np.empty((0, 0)), np.empty((0, 0))
+        self._X_BW = inverse_pose(placed.base)
+        # The configurations that bring the tool to where it was asked for last.
+        self._latest = np.empty((0, placed.arm.n))
 
     @cached_property
     def equations(self) -> CompiledArm | None:
@@ -158,27 +159,27 @@ class LiveArm:
         """Return all configurations that bring the tool to where it is; of an arm without a closed form the present."""
         if self._form is None or self.equations is None:
             return [Solution(self.q, "numeric", "", here=True)]
-        rows = self._branches(self.tool)
+        # Where a tool has been dragged, the arm is in one of the configurations that were found for that.
+        rows = self._latest if (self._latest == self.q).all(axis=1).any() else self._branches(self.tool)
         here = int(joint_distances(self.placed.arm, self.q, rows).argmin()) if len(rows) else -1
-        labels = _labels(self.placed.arm, self._form, rows)
+        labels, allowed = _labels(self.placed.arm, self._form, rows), self.is_allowed(rows).tolist()
         return [
-            Solution(q, labels[i], "; ".join(map(str, violations_of(self.placed.arm, q.tolist()))), here=i == here)
+            Solution(q, labels[i], "" if allowed[i] else self._limits_text(q), here=i == here)
             for i, q in enumerate(rows)
         ]
 
+    def _limits_text(self, q: Array) -> str:
+        """Return what is wrong with a configuration (n,) beyond the limits."""
+        return "; ".join(map(str, violations_of(self.placed.arm, q.tolist())))
+
     def _branches(self, X_WT: Array) -> Array:
         """Return the configurations (k, n) that bring the tool to a pose."""
-        # A tool that is dragged is asked about twice: where it can be, and where it is.
-        known, rows = self._latest
-        if known.shape == X_WT.shape and np.abs(X_WT - known).max() < _SAME:
-            return rows
         q, met = self.every_branch(X_WT, self.q)
         q = q[met]
         # A branch that a pose does not have repeats another.
         same = np.abs(q[:, None] - q).max(axis=2, initial=0.0) < _MET
-        rows = np.asarray(q[~np.tril(same, -1).any(axis=1)])
-        self._latest = np.array(X_WT), rows
-        return rows
+        self._latest = np.asarray(q[~np.tril(same, -1).any(axis=1)])
+        return self._latest
 
     def every_branch(self, X_WT: Array, near: Array) -> tuple[Array, Flags]:
         """Return the configurations of all branches for poses, and which of them bring the tool there.
@@ -191,7 +192,7 @@ class LiveArm:
             (..., k, n) and (..., k).
         """
         assert self.equations is not None  # noqa: S101 - asked for only where there is a closed form
-        X_BT = inverse(self.placed.base) @ X_WT
+        X_BT = self._X_BW @ X_WT
         q, _ = self.equations.inverse_branches(X_BT, near, threads=1)
         missed = np.abs(self.equations.forward(q, threads=1) - X_BT[..., None, :, :])
         return self._turned(q), np.asarray(missed.max(axis=(-2, -1)) < _MET)
@@ -274,7 +275,7 @@ class LiveArm:
         distances = joint_distances(self.placed.arm, self.q, rows)
         if not allowed.any():
             nearest = rows[distances.argmin()]
-            raise UnreachableError("; ".join(map(str, violations_of(self.placed.arm, nearest.tolist()))))
+            raise UnreachableError(self._limits_text(nearest))
         return np.asarray(np.clip(rows[np.where(allowed, distances, np.inf).argmin()], self.lower, self.upper))
 
     def stepped_to(self, X_WT: Array, q: Array) -> Array:
@@ -283,9 +284,9 @@ class LiveArm:
         Raises:
             UnreachableError: they lead nowhere.
         """
-        X_BT = inverse(self.placed.base) @ X_WT
+        X_BT = self._X_BW @ X_WT
         for _ in range(_STEPS):
-            X = inverse(self.placed.base) @ self.tool_at(q)
+            X = self._X_BW @ self.tool_at(q)
             error = np.concatenate([X_BT[:3, 3] - X[:3, 3], rotation_vector(X_BT[:3, :3] @ X[:3, :3].T)])
             error = error[self._rows]
             if np.abs(error).max() < _MET / 10:
@@ -312,8 +313,10 @@ class LiveArm:
         found = [Remark("limit", "warning", self._limit_text(i), (i + 1,)) for i in np.flatnonzero(near).tolist()]
         if self.placed.arm.n < _POSE:
             return found
-        U, sigma, Vt = np.linalg.svd(self.scaled_jacobian(self.jacobian_at(self.q)))
+        J = self.scaled_jacobian(self.jacobian_at(self.q))
+        sigma = np.linalg.svd(J, compute_uv=False)
         if sigma[-1] < _SMALL * sigma[0]:
+            U, _, Vt = np.linalg.svd(J)
             found.append(self._singular(float(sigma[-1] / sigma[0]), U[:, len(sigma) - 1], Vt[len(sigma) - 1]))
         return found
 

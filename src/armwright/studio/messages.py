@@ -322,10 +322,9 @@ class Preview:
 
 @attrs.frozen(kw_only=True)
 class Keep:
-    """Send a file of the run: its page, a 3-D file that moves, or a film of an arm."""
+    """Send a file of the run: its page, a 3-D file that moves, or a film."""
 
     what: Literal["page", "gltf", "gif"]
-    arm: str
 
 
 @attrs.frozen(kw_only=True)

@@ -21,8 +21,9 @@ from armwright.spatial.poses import to_noap
 from armwright.studio.workbench import Workbench
 from armwright.version import __version__
 
-# A comment of a style; in scripts they are lines.
+# A comment of a style; in scripts they are lines, or stand behind a statement.
 _BLOCK_COMMENT = re.compile(r"^[ ]*/\*.*?\*/$", re.DOTALL | re.MULTILINE)
+_LINE_COMMENT = re.compile(r"(^|;) *// .*$", re.MULTILINE)
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = (
     "basics.js",
@@ -74,9 +75,9 @@ def _asset(name: str) -> str:
 
 
 def _without_comments(script: str) -> str:
-    """Return a script, a style or a page without lines of comments and blanks before lines, a seventh of it."""
-    lines = map(str.strip, _BLOCK_COMMENT.sub("", script).splitlines())
-    return "\n".join(line for line in lines if line and not line.startswith("//"))
+    """Return a script, a style or a page without comments and blanks before lines, a seventh of it."""
+    lines = map(str.strip, _LINE_COMMENT.sub(r"\1", _BLOCK_COMMENT.sub("", script)).splitlines())
+    return "\n".join(filter(None, lines))
 
 
 def _shown_first(workbench: Workbench) -> dict[str, Any]:

@@ -176,15 +176,17 @@ class ProgramText:
         server = import_extra("armwright.program.language_server.analysis", "completion", "studio", "lsprotocol")
         return server.Analysis(compiled=self.compiled, codec=codec, cell=self.compiled.cell or self._cell)
 
-    def save(self) -> None:
-        """Write it to its file.
+    def save(self, path: Path) -> None:
+        """Write it to a file, which is its own from then on; what it IMPORTs is looked for beside that.
 
         Raises:
-            ProgramTextError: it has no file.
             OutputError: the file cannot be written, or somebody else has changed it meanwhile.
         """
-        write_back(self._file(), self._saved, self.text, "program_mb")
+        write_back(path, self._saved, self.text, "program_mb")
         self._saved = self.text
+        if path != self.path:
+            self.path = path
+            self._take_compiled(self._compiled(self.text))
 
     def reload(self) -> None:
         """Take the text that the file has now.
@@ -193,13 +195,10 @@ class ProgramText:
             ProgramTextError: it has no file.
             FileFormatError: the file cannot be read.
         """
-        self._saved = read_program(self._file())
-        self.replace(self._saved)
-
-    def _file(self) -> Path:
         if self.path is None:
             raise ProgramTextError("the program has no file yet; give it a name")
-        return self.path
+        self._saved = read_program(self.path)
+        self.replace(self._saved)
 
     # ---- teaching ------------------------------------------------------------------------------------------------
 

@@ -125,13 +125,10 @@ class Project:
             OutputError: it cannot be written, or somebody else has changed it meanwhile.
         """
         if what == "program":
-            self.program.path = self.program.path or _new_path(name, ".rlo")
-            self.program.save()
+            self.program.save(self.program.path or _new_path(name, ".rlo"))
             return
         file = self._teachable()
-        if not file.named:
-            file.path, file.named = _new_path(name, ".toml"), True
-        file.save()
+        file.save(file.path if file.named else _new_path(name, ".toml"))
 
     def unsaved(self) -> list[str]:
         """Return the names of the files whose changes have not been written."""

@@ -9,6 +9,7 @@ import json
 import logging
 import secrets
 import signal
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +32,9 @@ _PATIENCE = 1.0
 _TICK = 1 / 60
 # After a longer pause of the machine it does not leap [s].
 _LONGEST_TICK = 0.1
+# What is being computed at the end has so long to end by itself [s].
+_LAST_WAIT = 0.25
+_THREADS = "studio"
 # Pages at once at most.
 _MOST_PAGES = 8
 _POLICY = (
@@ -71,8 +75,9 @@ class Server:
         self._pages: dict[int, _Page] = {}
         self._count = 0
         self._sending: set[asyncio.Task[None]] = set()
-        # One thread makes all that is asked for, for pictures have to be taken by one; another one computes runs.
-        self._jobs, self._runs = (ThreadPoolExecutor(1, f"studio-{name}") for name in ("jobs", "runs"))
+        # One thread makes all that is asked for, for pictures have to be taken by one; another one compiles what moving
+        # needs, and then computes runs.
+        self._jobs, self._runs = (ThreadPoolExecutor(1, f"{_THREADS}-{name}") for name in ("jobs", "runs"))
         studio.project.executor = self._runs
 
     @property
@@ -198,8 +203,10 @@ class Server:
         with contextlib.suppress(ConnectionClosed):
             while True:
                 await page.waiting.wait()
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(page.may_send.wait(), _PATIENCE)
+                if not page.may_send.is_set():
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(_PATIENCE):
+                            await page.may_send.wait()
                 page.waiting.clear()
                 page.may_send.clear()
                 await page.socket.send(self._state_text(page))
@@ -210,9 +217,11 @@ class Server:
 
     async def _tick(self) -> None:
         """Let what moves by itself go on."""
-        before = time.monotonic()
+        before = due = time.monotonic()
         while True:
-            await asyncio.sleep(_TICK)
+            # As often as that, whatever a tick takes; what has been missed is not made up for.
+            due = max(due + _TICK, time.monotonic())
+            await asyncio.sleep(due - time.monotonic())
             now = time.monotonic()
             if self.studio.tick(now, min(now - before, _LONGEST_TICK)):
                 self._changed()
@@ -260,7 +269,7 @@ class Server:
         async with serving as server:
             self._port = server.sockets[0].getsockname()[1]
             announce(self.address)
-            warm = loop.run_in_executor(None, self.studio.workbench.warm_up)
+            warm = loop.run_in_executor(self._runs, self.studio.workbench.warm_up)
             ticking = asyncio.create_task(self._tick())
             warm.add_done_callback(lambda _: self._changed())
             waiting = asyncio.create_task(stopped.wait())
@@ -271,6 +280,7 @@ class Server:
             finally:
                 waiting.cancel()
                 ticking.cancel()
+                self.studio.has_ended = True
                 for executor in (self._jobs, self._runs):
                     executor.shutdown(wait=False, cancel_futures=True)
 
@@ -283,8 +293,8 @@ def _url(path: str) -> SplitResult:
         return urlsplit("")
 
 
-def serve(studio: Studio, announce: Callable[[str], None], port: int = 0) -> None:
-    """Serve a studio until Ctrl-C.
+def serve(studio: Studio, announce: Callable[[str], None], port: int = 0) -> bool:
+    """Serve a studio until Ctrl-C; return whether all that it computed has ended too.
 
     Args:
         studio: what the pages show.
@@ -292,3 +302,7 @@ def serve(studio: Studio, announce: Callable[[str], None], port: int = 0) -> Non
         port: to listen on; 0 for any that is free.
     """
     asyncio.run(Server(studio, port).run(announce))
+    threads = [it for it in threading.enumerate() if it.name.startswith(_THREADS)]
+    for thread in threads:
+        thread.join(_LAST_WAIT)
+    return not any(it.is_alive() for it in threads)

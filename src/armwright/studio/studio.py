@@ -53,11 +53,13 @@ class Studio:
         workbench: the arms.
         project: the files.
         control: which page commands.
+        has_ended: whether no page waits for anything any more.
     """
 
     def __init__(self, project: Project) -> None:
         """Take a project that no page commands yet."""
         self.project, self.workbench, self.control = project, project.workbench, Control()
+        self.has_ended = False
         self._jobs: list[tuple[int, Callable[[], dict[str, Any]]]] = []
         # Of them so many have not been made yet, those included that somebody makes.
         self._unmade = 0
@@ -191,9 +193,8 @@ class Studio:
         project, program = self.project, self.project.program
         match command:
             case m.Keep():
-                self.workbench.arm(command.arm)
-                run, what, arm = project.running(), command.what, command.arm
-                self._add_job(page, lambda: download(run.recording(), what, arm).message())
+                run, what = project.running(), command.what
+                self._add_job(page, lambda: download(run.recording(), what, lambda: self.has_ended).message())
             case m.Look():
                 take, camera = project.camera_picture(command.camera), command.camera
                 self._add_job(page, lambda: _picture_message(camera, take()))
@@ -317,7 +318,7 @@ class Studio:
         breakpoints = sorted(project.breakpoints)
         return {
             "around": (bench.around_key, bench.around_state),
-            "file": (None if file is None else (file.text, file.changed), project.file_state),
+            "file": (None if file is None else (file.text, file.changed, file.named), project.file_state),
             "program": (
                 (program.compilations, program.changed, tuple(breakpoints)),
                 lambda: {**program.state(), "breakpoints": breakpoints},

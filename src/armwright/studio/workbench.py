@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -23,6 +23,8 @@ from armwright.spatial.rotations import rotation_from_vector
 from armwright.studio.live_arm import LiveArm, Remark, Solution, UnreachableError
 from armwright.studio.program_run import ProgramRun
 from armwright.studio.reach_map import Plane, ReachMap
+
+_T = TypeVar("_T")
 
 # Full speed of jogging: of angles [rad/s], of lengths [m/s].
 TURNING, SLIDING = math.radians(45.0), 0.25
@@ -65,6 +67,8 @@ class Workbench:
         # Counts the changes of parts and frames that no motion of an arm makes, and whether arms move frames.
         self._changes = 0
         self._frames_move = (-1, False)
+        # What was worked out last, and of what.
+        self._known: dict[str, tuple[object, Any]] = {}
         self._undo: list[tuple[str, Array]] = []
         self._gesture = ("", -math.inf)
 
@@ -315,10 +319,15 @@ class Workbench:
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows that changes with the arms, as plain data."""
+        stood = self.ready, self._changes
+        moved = {name: arm.q.tobytes() for name, arm in self.arms.items()}
         return {
             "ready": self.ready,
-            "arms": {name: self._arm_state(arm) for name, arm in self.arms.items()},
-            "near": self._near_state(),
+            "arms": {
+                name: self._once(f"arm {name}", (moved[name], stood), partial(self._arm_state, arm))
+                for name, arm in self.arms.items()
+            },
+            "near": self._once("near", (moved, stood), self._near_state),
             "ghost": None if self._ghost is None else {"arm": self._ghost[0], "q": _rounded(self._ghost[1])},
             "undo": len(self._undo),
         }
@@ -340,8 +349,15 @@ class Workbench:
             "targets": {name: {"arm": it.arm, "q": _rounded(it.q)} for name, it in self.cell.joint_targets.items()},
         }
 
+    def _once(self, what: str, key: object, make: Callable[[], _T]) -> _T:
+        """Return what is made of a key, or what was made of it last: for another page, or of what stands still."""
+        known = self._known.get(what)
+        if known is None or known[0] != key:
+            known = self._known[what] = key, make()
+        return known[1]  # type: ignore[no-any-return] # what this maker has made
+
     def _arm_state(self, arm: LiveArm) -> dict[str, Any]:
-        opening = self.cell.arms[arm.name].gripper_or_usual.opening
+        opening = arm.placed.gripper_or_usual.opening
         state: dict[str, Any] = {
             "q": _rounded(arm.q),
             "grip": round(self._parts.opening(arm.name) / opening, 4),
@@ -349,7 +365,7 @@ class Workbench:
         }
         if self.ready:
             state["tool"] = _rounded(to_noap(arm.tool))
-            state["solutions"] = [_solution_state(it) for it in arm.solutions()]
+            state["solutions"] = _solution_states(arm.solutions())
             state["warnings"] = [_remark_state(it) for it in arm.remarks()]
         return state
 
@@ -361,13 +377,16 @@ class Workbench:
         return None if near is None else {"distance": round(near.distance, 6), "bodies": list(near.names)}
 
 
-def _solution_state(it: Solution) -> dict[str, Any]:
-    return {"label": it.label, "fault": it.fault, "here": it.here, "q": _rounded(it.q)}
+def _solution_states(solutions: list[Solution]) -> list[dict[str, Any]]:
+    rows = _rounded(np.array([it.q for it in solutions]))
+    return [
+        {"label": it.label, "fault": it.fault, "here": it.here, "q": q} for it, q in zip(solutions, rows, strict=True)
+    ]
 
 
 def _remark_state(it: Remark) -> dict[str, Any]:
     return {"kind": it.kind, "level": it.level, "text": it.text, "joints": list(it.joints)}
 
 
-def _rounded(array: Array) -> list[float]:
+def _rounded(array: Array) -> list[Any]:
     return (np.round(array, 7) + 0.0).tolist()  # type: ignore[no-any-return] # adding 0 turns -0 into 0

@@ -16,6 +16,16 @@ const LABEL_PLACES = [0, 1, 2, 3].flatMap((far) => [
 // So many names of one point are told, and others counted.
 const MOST_NAMES = 3;
 
+// Widths of what is written again and again.
+const MOST_WIDTHS = 500;
+const widths = new Map();
+
+function widthOf(text) {
+  if (widths.size > MOST_WIDTHS) widths.clear();
+  if (!widths.has(text)) widths.set(text, pen.measureText(text).width);
+  return widths.get(text);
+}
+
 // Names of one point are joined.
 function joinedLabels() {
   const joined = [];
@@ -43,8 +53,8 @@ function boxesOf({ p, below }, wide) {
     const x = side === 0 ? p.x - wide / 2 : side > 0 ? p.x + 7 : p.x - 7 - wide;
     const middle = p.y + line * (LABEL_HEIGHT / 2 + 2);
     return {
-      x: Math.min(Math.max(x, 4), canvas.clientWidth - wide - 4),
-      y: Math.min(Math.max(middle - LABEL_HEIGHT / 2, 2), canvas.clientHeight - LABEL_HEIGHT - 2),
+      x: Math.min(Math.max(x, 4), 2 * lens.x - wide - 4),
+      y: Math.min(Math.max(middle - LABEL_HEIGHT / 2, 2), 2 * lens.y - LABEL_HEIGHT - 2),
       wide,
       far: Math.abs(line) > 2 && !below,
     };
@@ -60,13 +70,13 @@ function paintLabels() {
   pen.textBaseline = "middle";
   pen.lineJoin = "round";
   const scale = `grid ${canvas.dataset.grid}`;
-  const taken = [{ x: 10, y: canvas.clientHeight - 18, wide: pen.measureText(scale).width }];
+  const taken = [{ x: 10, y: 2 * lens.y - 18, wide: widthOf(scale) }];
   pen.fillStyle = colours.quiet;
   pen.fillText(scale, taken[0].x, taken[0].y + 8);
   for (const label of labels) label.hidden = isHidden(label.p);
   // What is in sight has the first choice of places.
   for (const label of joinedLabels().sort((a, b) => a.hidden - b.hidden)) {
-    const box = boxesOf(label, pen.measureText(label.text).width).find(
+    const box = boxesOf(label, widthOf(label.text)).find(
       (one) => !taken.some((other) => overlap(one, other)),
     );
     if (!box) continue;

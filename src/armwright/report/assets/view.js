@@ -78,26 +78,45 @@ function paintSolids(bodies, width, height) {
   else showSurface(width, height);
 }
 
-function stroke(a, b, colour, width, alpha = 1) {
-  if (Math.min(a.depth, b.depth) < 0.03 * camera.distance) return;
+// Lines, each from one point of the screen to the next; pieces behind the eye are left out.
+function strokeLines(lines, colour, width, alpha = 1) {
+  const nearest = 0.03 * camera.distance;
   pen.globalAlpha = alpha;
   pen.strokeStyle = colour;
   pen.lineWidth = width;
   pen.beginPath();
-  pen.moveTo(a.x, a.y);
-  pen.lineTo(b.x, b.y);
+  for (const points of lines) {
+    let last = null;
+    for (const point of points) {
+      const seen = point.depth >= nearest;
+      if (seen && last) pen.lineTo(point.x, point.y);
+      else if (seen) pen.moveTo(point.x, point.y);
+      last = seen ? point : null;
+    }
+  }
   pen.stroke();
   pen.globalAlpha = 1;
 }
+
+const stroke = (a, b, colour, width, alpha) => strokeLines([[a, b]], colour, width, alpha);
 
 // A line whose pieces behind a body are faint: it stays visible there.
 function strokeBehind(a, b, colour, width, alpha = 1) {
   const [from, to] = [project(a), project(b)];
   const pieces = Math.min(40, Math.max(1, Math.ceil(Math.hypot(to.x - from.x, to.y - from.y) / 5)));
-  const point = (k) => project(plus(a, plus(b, a, -1), k / pieces));
+  const along = plus(b, a, -1);
+  const point = (k) => project(plus(a, along, k / pieces));
   pen.lineCap = pieces > 1 ? "butt" : "round";
-  for (let k = 0; k < pieces; k++)
-    stroke(point(k), point(k + 1), colour, width, isHidden(point(k + 0.5)) ? 0.28 * alpha : alpha);
+  const lines = { true: [], false: [] };
+  let [line, was] = [[from], null];
+  for (let k = 0; k < pieces; k++) {
+    const hidden = isHidden(point(k + 0.5));
+    if (hidden !== was) lines[hidden].push((line = [line.at(-1)]));
+    was = hidden;
+    line.push(point(k + 1));
+  }
+  if (lines.false.length) strokeLines(lines.false, colour, width, alpha);
+  if (lines.true.length) strokeLines(lines.true, colour, width, 0.28 * alpha);
 }
 
 function paintFrames(place) {
@@ -158,7 +177,7 @@ function paintPlane(height) {
   pen.globalAlpha = 0.6;
   pen.stroke();
   pen.globalAlpha = 1;
-  const inside = corners.find(({ x, y }) => x > 0 && y > 0 && x < canvas.clientWidth && y < canvas.clientHeight);
+  const inside = corners.find(({ x, y }) => x > 0 && y > 0 && x < 2 * lens.x && y < 2 * lens.y);
   labels.push({ p: inside ?? corners[0], text: `contact at z = ${number(height * MILLIMETRES, 1)} mm`, quiet: true });
 }
 
@@ -168,12 +187,14 @@ function paintFloor() {
     scenery.low.slice(0, 2).map((v) => Math.floor(v / step) - 1),
     scenery.high.slice(0, 2).map((v) => Math.ceil(v / step) + 1),
   ];
-  const at = (x, y) => project([x * step, y * step, scenery.floor]);
-  for (let x = low[0]; x <= high[0]; x++)
-    for (let y = low[1]; y < high[1]; y++) stroke(at(x, y), at(x, y + 1), colours.floor, 1);
-  for (let y = low[1]; y <= high[1]; y++)
-    for (let x = low[0]; x < high[0]; x++) stroke(at(x, y), at(x + 1, y), colours.floor, 1);
-  canvas.dataset.grid = `${number(step * MILLIMETRES, 0)} mm`;
+  const count = (k) => high[k] - low[k] + 1;
+  const rows = Array.from({ length: count(0) }, (_, i) =>
+    Array.from({ length: count(1) }, (__, j) => project([(low[0] + i) * step, (low[1] + j) * step, scenery.floor])),
+  );
+  const columns = rows[0].map((_, j) => rows.map((row) => row[j]));
+  strokeLines([...rows, ...columns], colours.floor, 1);
+  const text = `${number(step * MILLIMETRES, 0)} mm`;
+  if (canvas.dataset.grid !== text) canvas.dataset.grid = text;
 }
 
 function paintWorldAxes() {

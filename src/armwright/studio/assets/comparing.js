@@ -77,10 +77,8 @@ function paintPaths() {
 }
 
 function paintLine(points, shade, width, alpha, dashes = []) {
-  const places = points.map(project);
   pen.setLineDash(dashes);
-  for (let i = 0; i + 1 < places.length; i++)
-    if (Math.min(places[i].depth, places[i + 1].depth) > 0.03 * camera.distance) stroke(places[i], places[i + 1], shade, width, alpha);
+  strokeLines([points.map(project)], shade, width, alpha);
   pen.setLineDash([]);
 }
 

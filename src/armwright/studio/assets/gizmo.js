@@ -124,7 +124,7 @@ function paintGizmo() {
     const lit = [gizmo.hover, gizmo.drag?.handle].some((one) => one && one.kind === handle.kind && one.k === handle.k);
     const points = handle.points.map(project);
     const width = handle.kind === "move" ? (lit ? 6 : 3.5) : lit ? 4.5 : 2;
-    for (let i = 0; i + 1 < points.length; i++) stroke(points[i], points[i + 1], shades[handle.k], width, lit ? 1 : 0.75);
+    strokeLines([points], shades[handle.k], width, lit ? 1 : 0.75);
     if (handle.kind === "move") {
       const tip = points[1];
       pen.beginPath();

@@ -52,7 +52,7 @@ function paintGhost() {
   const places = points.map(project);
   pen.setLineDash([7, 5]);
   pen.lineJoin = "round";
-  for (let i = 0; i + 1 < places.length; i++) stroke(places[i], places[i + 1], colours.accent, 3, 0.9);
+  strokeLines([places], colours.accent, 3, 0.9);
   pen.setLineDash([]);
   const tip = places.at(-1);
   pen.beginPath();

@@ -115,6 +115,17 @@ function fillPendant() {
   );
 }
 
+// Numbers and sliders are read: they follow the view so often [ms].
+const READ_AGAIN = 60;
+let pendantTimer = 0;
+
+function showPendantSoon() {
+  pendantTimer ||= setTimeout(() => {
+    pendantTimer = 0;
+    showPendant(live.state);
+  }, READ_AGAIN);
+}
+
 function showPendant(state) {
   const it = state?.arms[chosenArm().name];
   if (!it) return;

@@ -121,7 +121,7 @@ function startRunning() {
   for (const button of document.querySelectorAll("[data-keep]"))
     button.addEventListener("click", () => {
       byId("export-text").textContent = "being made";
-      send({ do: "keep", what: button.dataset.keep, arm: chosenArm().name });
+      send({ do: "keep", what: button.dataset.keep });
     });
   byId("run").addEventListener("click", startRun);
   byId("pause").addEventListener("click", () => send({ do: "pause" }));
@@ -150,8 +150,10 @@ function startRunning() {
       one.tabIndex = one === tab ? 0 : -1;
       byId(one.getAttribute("aria-controls")).hidden = one !== tab;
     }
-    // Compared motions are in the view while the tab of runs is open.
+    // Compared motions are in the view while the tab of runs is open, whose charts are not drawn before.
     drawSoon();
+    paintStrip();
+    paintComparison();
   };
   tabs.forEach((tab, i) => {
     tab.addEventListener("click", () => choose(tab));

@@ -137,7 +137,7 @@ function start() {
       STATS.states++;
       applyState(state);
       showWarnings(state);
-      showPendant(state);
+      showPendantSoon();
       showTeaching(state);
       showEditor(state);
       showRun(state);
