@@ -6,6 +6,7 @@ from . import (
     clearance as clearance,
     compiled as compiled,
     dynamics as dynamics,
+    identification as identification,
     kinematics as kinematics,
     motion as motion,
     physics as physics,
