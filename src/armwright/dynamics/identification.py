@@ -141,7 +141,7 @@ def independent_columns(Y: Array, order: Sequence[int]) -> tuple[tuple[int, ...]
         order: of all columns: of those that depend on each other the first ones are kept.
 
     Returns:
-        The b independent columns, sorted, and the (b, p) combinations of the parameters: Y = Y[:, columns] combinations.
+        The b independent columns, sorted, and the (b, p) combinations of all p: Y = Y[:, columns] combinations.
     """
     lengths = np.linalg.norm(Y, axis=0)
     has_effect = lengths > _NO_EFFECT * lengths.max()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property, partial
 from typing import TypeAlias
 
@@ -32,6 +32,10 @@ _STATES = 200
 Indices: TypeAlias = npt.NDArray[np.intp]
 
 
+def _terms(value: Iterable[str]) -> tuple[str, ...]:
+    return tuple(value)
+
+
 @attrs.frozen(kw_only=True, eq=False, slots=False)
 class DynamicModel:
     """How the efforts of an arm depend on its unknown parameters: tau = Y(q, qd, qdd) theta.
@@ -50,7 +54,7 @@ class DynamicModel:
     """
 
     arm: Arm
-    terms: tuple[str, ...] = attrs.field(default=("rotor", "viscous", "coulomb", "offset"), converter=tuple)
+    terms: tuple[str, ...] = attrs.field(default=("rotor", "viscous", "coulomb", "offset"), converter=_terms)
     stribeck_speed: Array = attrs.field(
         default=attrs.Factory(lambda self: np.full(self.arm.n, STRIBECK_SPEED), takes_self=True), converter=read_only
     )
@@ -99,7 +103,11 @@ class DynamicModel:
         Returns:
             (k, n, p), a column for each of the parameters of ``names``.
         """
-        return self._columns(q, qd, qdd, link_columns=compile_arm(_skeleton(self.arm)).regressor)
+        return self._columns(q, qd, qdd, link_columns=self._link_columns)
+
+    @cached_property
+    def _link_columns(self) -> Callable[..., Array]:
+        return compile_arm(_skeleton(self.arm)).regressor
 
     def _columns(self, *motion: ArrayLike, link_columns: Callable[..., Array]) -> Array:
         q, qd, qdd = (np.asarray(x, dtype=np.float64) for x in motion)
