@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from armwright.arrays import Array, Flags
-from armwright.identification.model import DynamicModel
+from armwright.arrays import Array, ArrayLike, Flags
 from armwright.identification.signals import Motion
 
 # Equations whose columns exist at full rate at a time.
 _BLOCK = 256
+
+
+class Columns(Protocol):
+    """A model whose efforts are linear in its parameters."""
+
+    def base_columns(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+        """Return the columns (k, n, b) of its parameters."""
 
 
 class Equations(NamedTuple):
@@ -34,7 +40,7 @@ class Equations(NamedTuple):
 
 
 def equations(
-    model: DynamicModel, motions: Iterable[Motion], decimation: int, *, values: Array | None = None
+    model: Columns, motions: Iterable[Motion], decimation: int, *, values: Array | None = None
 ) -> Iterator[Equations]:
     """Give the equations of motions.
 

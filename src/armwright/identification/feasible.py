@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -71,16 +71,52 @@ def feasible(model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1
         MissingExtraError: Clarabel is not installed.
         ContradictionError: no set of bodies was found.
     """
+    names = enumerate(model.names[OF_LINK * model.arm.n :], OF_LINK * model.arm.n)
+    bounded = [k for k, name in names if name.rstrip("0123456789").removeprefix("coupled_") in _DISSIPATING]
+    drawing = [_pseudo_inertia(body) for body in _drawing(model.arm)]
+    measured = Measured(combinations=model.base.combinations, sums=sums, sigma=sigma)
+    values, smallest = possible_bodies(measured, drawing, bounded, weight=weight)
+    return Standard(values=values, base=model.base.combinations @ values, weight=weight, smallest=smallest)
+
+
+class Measured(NamedTuple):
+    """What measurements say of bodies and drives.
+
+    Attributes:
+        combinations: (b, p) parameters that were measured by those of the bodies, ten each, and of drives.
+        sums: of the measured equations.
+        sigma: (n,) standard deviations of the residuals of each joint.
+    """
+
+    combinations: Array
+    sums: Sums
+    sigma: Array
+
+
+def possible_bodies(
+    measured: Measured, drawing: Sequence[Array], bounded: Sequence[int], *, weight: float
+) -> tuple[Array, float]:
+    """Return parameters (p,) that bodies and drives can have, and the least eigenvalue of any pseudo-inertia.
+
+    Args:
+        measured: what measurements say.
+        drawing: pseudo-inertias (4, 4) of the bodies as drawn, positive definite.
+        bounded: parameters that cannot be negative.
+        weight: of the drawing.
+
+    Raises:
+        MissingExtraError: Clarabel is not installed.
+        ContradictionError: no set of bodies was found.
+    """
     clarabel = import_extra("clarabel", "a set of masses and inertias that bodies can have", "identification")
     from scipy import sparse  # noqa: PLC0415 - takes a tenth of a second to load
     from scipy.linalg import eigvalsh  # noqa: PLC0415
 
-    drawing = [_pseudo_inertia(body) for body in _drawing(model.arm)]
-    scales = _scales(model, drawing)
-    quadratic, linear = _objective(model, sums, sigma, drawing, weight=weight)
-    rows = _constraints(model, scales, drawing)
+    scales = _scales(measured.combinations.shape[1], drawing)
+    quadratic, linear = _objective(measured, scales, drawing, weight=weight)
+    rows = _constraints(scales, drawing, bounded)
     cones = [
-        clarabel.NonnegativeConeT(len(_bounded(model))),
+        clarabel.NonnegativeConeT(len(bounded)),
         *[clarabel.PSDTriangleConeT(8)] * len(drawing),
         *[clarabel.ExponentialConeT()] * (4 * len(drawing)),
     ]
@@ -95,8 +131,7 @@ def feasible(model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1
         )
     values = np.array(solution.x[: len(scales)]) * scales
     links = values[: OF_LINK * len(drawing)].reshape(-1, OF_LINK)
-    smallest = min(float(eigvalsh(_unfolded(own), P0)[0]) for own, P0 in zip(links, drawing, strict=True))
-    return Standard(values=values, base=model.base.combinations @ values, weight=weight, smallest=smallest)
+    return values, min(float(eigvalsh(_unfolded(own), P0)[0]) for own, P0 in zip(links, drawing, strict=True))
 
 
 def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:
@@ -111,10 +146,8 @@ def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:
     named = dict(zip(model.names, np.asarray(values).tolist(), strict=True))
     links = []
     for i, link in enumerate(arm.links):
-        m, *rest = np.asarray(values[OF_LINK * i : OF_LINK * (i + 1)]).tolist()
-        xx, xy, xz, yy, yz, zz = rest[3:]
-        new = as_link(Body(mass=m, moment=rest[:3], tensor=[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        links.append(attrs.evolve(new, name=link.name, solids=link.solids, complete=True))
+        new = link_of(np.asarray(values[OF_LINK * i : OF_LINK * (i + 1)]))
+        links.append(attrs.evolve(new, name=link.name, solids=link.solids))
     motors, joints = [], []
     for i, (motor, joint) in enumerate(zip(arm.motors, arm.joints, strict=True), 1):
         own = {term: named[f"{term}{i}"] for term in model.terms}
@@ -137,13 +170,26 @@ def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:
     return attrs.evolve(arm, links=links, motors=motors, joints=joints, source=title or arm.source)
 
 
+def link_of(theta: Array) -> Link:
+    """Return a body by its ten parameters, in the order of ``dynamics.dynamic_parameters``."""
+    m, x, y, z, xx, xy, xz, yy, yz, zz = theta.tolist()
+    body = Body(mass=m, moment=[x, y, z], tensor=[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return attrs.evolve(as_link(body), complete=True)
+
+
 # ---- the program -----------------------------------------------------------------------------------------------------
+
+
+def ball(mass: float) -> Array:
+    """Return the pseudo-inertia (4, 4) of a ball about its middle, of which nothing is known but its mass [kg]."""
+    spread = mass * _UNKNOWN_RADIUS**2 / 5
+    return np.diag([spread, spread, spread, mass])
 
 
 def _drawing(arm: Arm) -> list[Body]:
     """Return the bodies of the drawing; a ball where it has none that has an extent."""
-    ball = Link(mass=_UNKNOWN_MASS, inertia=0.4 * _UNKNOWN_MASS * _UNKNOWN_RADIUS**2 * np.eye(3))
-    return [body_of(link if link.mass > 0 and not link.unknown else ball) for link in arm.links]
+    unknown = Link(mass=_UNKNOWN_MASS, inertia=0.4 * _UNKNOWN_MASS * _UNKNOWN_RADIUS**2 * np.eye(3))
+    return [body_of(link if link.mass > 0 and not link.unknown else unknown) for link in arm.links]
 
 
 def _pseudo_inertia(body: Body) -> Array:
@@ -166,13 +212,13 @@ def _unfolded(theta: Array) -> Array:
     )
 
 
-def _scales(model: DynamicModel, drawing: Sequence[Array]) -> Array:
-    """Return the sizes of the parameters (p,): of those of links by their drawings, 1 of others."""
-    of_links: list[float] = []
+def _scales(count: int, drawing: Sequence[Array]) -> Array:
+    """Return the sizes of the parameters (count,): of those of bodies by their drawings, 1 of others."""
+    of_bodies: list[float] = []
     for P in drawing:
         m, spread = P[3, 3], float(np.trace(P[:3, :3]))
-        of_links += [m, *[np.sqrt(m * spread)] * 3, *[spread] * 6]
-    return np.array([*of_links, *np.ones(len(model.names) - len(of_links))])
+        of_bodies += [m, *[np.sqrt(m * spread)] * 3, *[spread] * 6]
+    return np.array([*of_bodies, *np.ones(count - len(of_bodies))])
 
 
 class _Constraints:
@@ -200,20 +246,11 @@ class _Constraints:
         )
 
 
-def _bounded(model: DynamicModel) -> list[int]:
-    """Return which parameters cannot be negative, those of drives."""
-    names = enumerate(model.names[OF_LINK * model.arm.n :], OF_LINK * model.arm.n)
-    return [k for k, name in names if name.rstrip("0123456789").removeprefix("coupled_") in _DISSIPATING]
-
-
-def _objective(
-    model: DynamicModel, sums: Sums, sigma: Array, drawing: Sequence[Array], *, weight: float
-) -> tuple[Array, Array]:
-    """Return P and q of the objective x P x / 2 + q x, of the parameters and of the variables of each link."""
-    scales = _scales(model, drawing)
-    p, b = len(scales), sums.products.shape[1] - 1
-    N = np.einsum("n,nij->ij", 1 / sigma**2, sums.products)
-    C = model.base.combinations * scales
+def _objective(measured: Measured, scales: Array, drawing: Sequence[Array], *, weight: float) -> tuple[Array, Array]:
+    """Return P and q of the objective x P x / 2 + q x, of the scaled parameters and of the variables of each body."""
+    p, b = len(scales), len(measured.combinations)
+    N = np.einsum("n,nij->ij", 1 / measured.sigma**2, measured.sums.products)
+    C = measured.combinations * scales
     quadratic, linear = np.zeros((p + _OWN * len(drawing),) * 2), np.zeros(p + _OWN * len(drawing))
     quadratic[:p, :p] = 2 * C.T @ N[:b, :b] @ C
     linear[:p] = -2 * C.T @ N[:b, b]
@@ -226,14 +263,14 @@ def _objective(
     return quadratic, linear
 
 
-def _constraints(model: DynamicModel, scales: Array, drawing: Sequence[Array]) -> _Constraints:
+def _constraints(scales: Array, drawing: Sequence[Array], bounded: Sequence[int]) -> _Constraints:
     """Return that drives take energy, and that the pseudo-inertias S have the logarithms of their determinants.
 
-    A link has ten variables, a lower triangle Z, and four more, logarithms. With D the diagonal of Z,
+    A body has ten variables, a lower triangle Z, and four more, logarithms. With D the diagonal of Z,
     [[S, Z], [Z', D]] is positive semidefinite only if log det S is no less than the sum of the logarithms of D.
     """
     rows, p = _Constraints(), len(scales)
-    for k in _bounded(model):
+    for k in bounded:
         rows.add({k: 1.0})
     for i, P0 in enumerate(drawing):
         # Scaled so that the drawing is the identity: then the program is as well conditioned as bodies are alike.
