@@ -7,6 +7,7 @@ from . import (
     compiled as compiled,
     dynamics as dynamics,
     export as export,
+    identification as identification,
     kinematics as kinematics,
     motion as motion,
     physics as physics,

@@ -124,19 +124,36 @@ def _base_parameters(arm: Arm) -> BaseParameters:
     if arm.coupling is not None:
         qd = arm.coupling.matrix @ qd  # these were the speeds of the drives
     Y = stack_matrix(effort_regressor(arm, list(q), list(qd), list(qdd)), (_STATES,))
-    Y = Y.reshape(-1, parameter_count(arm))
+    order = [*link_order(n), *range(OF_LINK * n, parameter_count(arm))]
+    columns, combinations = independent_columns(Y.reshape(-1, parameter_count(arm)), order)
+    names = parameter_names(arm)
+    return BaseParameters(columns, tuple(names[k] for k in columns), combinations)
+
+
+def link_order(n: int) -> list[int]:
+    """Return the columns of the links in the order in which independent ones are chosen: of each link its mass last."""
+    return [OF_LINK * i + k for i in range(n) for k in (*range(1, OF_LINK), 0)]
+
+
+def independent_columns(Y: Array, order: Sequence[int]) -> tuple[tuple[int, ...], Array]:
+    """Return which columns of a matrix are independent, and how the others are combined of them.
+
+    Args:
+        Y: (m, p) rows of a regressor at states that show its structure, more than p.
+        order: of all columns: of those that depend on each other the first ones are kept.
+
+    Returns:
+        The b independent columns, sorted, and the (b, p) combinations of all p: Y = Y[:, columns] combinations.
+    """
     lengths = np.linalg.norm(Y, axis=0)
     has_effect = lengths > _NO_EFFECT * lengths.max()
     # The factor R has the same dependences between columns, in as many rows as columns.
     R = np.array(np.linalg.qr(np.where(has_effect, Y / np.where(has_effect, lengths, 1.0), 0.0), mode="r"))
-    of_links = [OF_LINK * i + k for i in range(n) for k in (*range(1, OF_LINK), 0)]
-    columns = _independent(R, [*of_links, *range(OF_LINK * n, len(lengths))])
+    columns = _independent(R, order)
     coefficients = np.linalg.lstsq(R[:, columns], R, rcond=None)[0]
     coefficients[np.abs(coefficients) < _NO_COEFFICIENT] = 0.0
     coefficients[:, columns] = np.eye(len(columns))
-    combinations = coefficients * lengths / lengths[columns][:, None]
-    names = parameter_names(arm)
-    return BaseParameters(tuple(columns), tuple(names[k] for k in columns), combinations)
+    return tuple(columns), coefficients * lengths / lengths[columns][:, None]
 
 
 def _independent(R: Array, order: Sequence[int]) -> list[int]:

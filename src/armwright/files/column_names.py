@@ -45,13 +45,26 @@ LENGTH = Quantity("length", {"mm": 1e-3, "m": 1.0, "cm": 1e-2, "um": 1e-6, "in":
 ANGLE = Quantity("angle", {"deg": _DEGREE, "rad": 1.0, "mrad": 1e-3})
 TIME = Quantity("time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0})
 FORCE = Quantity("force", {"n": 1.0, "kn": 1e3})
+TORQUE = Quantity("torque", {"nm": 1.0, "mnm": 1e-3, "knm": 1e3})
+CURRENT = Quantity("current", {"a": 1.0, "ma": 1e-3})
 VELOCITY = Quantity("velocity", {"mm_per_s": 1e-3, "m_per_s": 1.0, "m_per_min": 1 / 60, "mm_per_min": 1e-3 / 60})
 ANGULAR_VELOCITY = Quantity("angular velocity", {"deg_per_s": _DEGREE, "rad_per_s": 1.0})
 ACCELERATION = Quantity("acceleration", {"mm_per_s2": 1e-3, "m_per_s2": 1.0})
 ANGULAR_ACCELERATION = Quantity("angular acceleration", {"deg_per_s2": _DEGREE, "rad_per_s2": 1.0})
 NUMBER = Quantity("number", {})
 WORD = Quantity("word", {})
-_QUANTITIES = (LENGTH, ANGLE, TIME, FORCE, VELOCITY, ANGULAR_VELOCITY, ACCELERATION, ANGULAR_ACCELERATION)
+_QUANTITIES = (
+    LENGTH,
+    ANGLE,
+    TIME,
+    FORCE,
+    TORQUE,
+    CURRENT,
+    VELOCITY,
+    ANGULAR_VELOCITY,
+    ACCELERATION,
+    ANGULAR_ACCELERATION,
+)
 
 
 @attrs.frozen(kw_only=True)

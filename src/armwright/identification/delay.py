@@ -1,0 +1,38 @@
+"""The delay between efforts and positions: positions come from another device than currents, and later."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+
+from armwright.identification.equations import equations
+from armwright.identification.fitting import summed, weighted
+from armwright.identification.log import Log
+from armwright.identification.model import DynamicModel
+from armwright.identification.signals import Preparation, motions
+
+# Steps at most, and the part of a period of the readings at which the delay is found.
+_MAX_STEPS, _FOUND = 8, 0.03
+
+
+def with_delay(model: DynamicModel, logs: Sequence[Log], preparation: Preparation) -> Preparation:
+    """Return a preparation with the delay at which motions explain efforts best, by Gauss and Newton's method.
+
+    Args:
+        model: of the arm.
+        logs: of its motions.
+        preparation: of motions; its delay is the first guess.
+
+    Raises:
+        TooFewError: there are fewer equations than parameters.
+    """
+    size = preparation.decimation
+    values = weighted(summed(equations(model, motions(logs, preparation), size))).values
+    for _ in range(_MAX_STEPS):
+        step = weighted(summed(equations(model, motions(logs, preparation), size, values=values))).values
+        preparation = attrs.evolve(preparation, delay=preparation.delay + float(step[-1]))
+        values = step[:-1]
+        if abs(step[-1]) < _FOUND * logs[0].period:
+            break
+    return preparation

@@ -1,0 +1,151 @@
+"""Logs of an arm: positions and efforts of its joints in time, and what may be wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, Flags, exact_shape, floats, read_only
+from armwright.errors import InvalidValueError, ShapeError
+
+# Samples farther apart than so many usual ones are a gap.
+_GAP = 5.0
+# Sampling times that differ by less than this part of the period are even.
+_EVEN = 0.01
+# Fewer samples than this are no motion.
+LEAST_SAMPLES = 50
+# A step of positions is motion if it is larger than this part of the largest.
+_MOVES = 0.05
+# So many equal readings in a row at the largest magnitude of a joint are clipped.
+_CLIPPED = 4
+
+
+def _array(value: ArrayLike) -> Array:
+    return read_only(floats(value, "log", LARGEST))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Log:
+    """Readings of the n joints of an arm at k times.
+
+    Attributes:
+        name: of the log, for messages.
+        t: (k,) times [s], increasing.
+        q: (k, n) joint positions [rad] or [m].
+        effort: (k, n) efforts at the joints [N m] or [N]; or currents [A], where drive gains are sought.
+        qd: (k, n) measured joint velocities; None where they were not measured.
+        clipped: (k, n) whether a reading of the effort is at the end of its range.
+    """
+
+    name: str
+    t: Array = attrs.field(converter=_array)
+    q: Array = attrs.field(converter=_array)
+    effort: Array = attrs.field(converter=_array)
+    qd: Array | None = attrs.field(default=None, converter=attrs.converters.optional(_array))
+    clipped: Flags = attrs.field(
+        default=attrs.Factory(lambda self: _clipped(self.effort), takes_self=True), converter=read_only
+    )
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse arrays that do not fit together, too few readings, and times that do not increase."""
+        if self.t.ndim != 1 or self.q.ndim != 2:
+            raise ShapeError(
+                f"{self.name}: expected times (k,) and positions (k, n), got {self.t.shape}, {self.q.shape}"
+            )
+        shape = len(self.t), self.q.shape[1]
+        for key in ("q", "effort", "qd"):
+            if getattr(self, key) is not None:
+                exact_shape(getattr(self, key), shape, f"{self.name}: {key}", LARGEST)
+        if len(self.t) < LEAST_SAMPLES:
+            raise InvalidValueError(f"{self.name}: expected at least {LEAST_SAMPLES} readings, got {len(self.t)}")
+        wrong = np.flatnonzero(np.diff(self.t) <= 0)
+        if len(wrong):
+            i = int(wrong[0])
+            raise InvalidValueError(
+                f"{self.name}: expected times that increase, got {self.t[i]:.6g} s and then {self.t[i + 1]:.6g} s"
+            )
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[1])
+
+    @property
+    def period(self) -> float:
+        """The usual time between two readings [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    def take(self, rows: slice) -> Log:
+        """Return a part of the log."""
+        qd = None if self.qd is None else self.qd[rows]
+        return attrs.evolve(
+            self, t=self.t[rows], q=self.q[rows], effort=self.effort[rows], qd=qd, clipped=self.clipped[rows]
+        )
+
+    def moving(self) -> Log:
+        """Return the log from the first motion to the last, with what is next to it.
+
+        What a joint that stands before and after a program is held by, brakes or drives, nobody knows.
+        """
+        steps = np.abs(np.diff(self.q, axis=0)).max(axis=1)
+        active = np.flatnonzero(steps > _MOVES * steps.max(initial=0.0))
+        if not len(active):
+            return self
+        first, last = max(0, int(active[0]) - LEAST_SAMPLES // 2), int(active[-1]) + LEAST_SAMPLES // 2
+        return self.take(slice(first, last)) if last - first >= LEAST_SAMPLES else self
+
+    def gaps(self) -> list[tuple[float, float]]:
+        """Return beginning and length of the gaps in the log [s]."""
+        steps = np.diff(self.t)
+        return [(float(self.t[i]), float(steps[i])) for i in np.flatnonzero(steps > _GAP * self.period)]
+
+    def pieces(self) -> Iterator[Log]:
+        """Give the parts between gaps that are long enough, each sampled evenly."""
+        ends = np.flatnonzero(np.diff(self.t) > _GAP * self.period) + 1
+        for first, last in zip([0, *ends], [*ends, len(self.t)], strict=True):
+            if last - first >= LEAST_SAMPLES:
+                yield self.take(slice(int(first), int(last))).even()
+
+    def even(self) -> Log:
+        """Return the log at even times, interpolated where it was not sampled evenly."""
+        steps = np.diff(self.t)
+        period = (self.t[-1] - self.t[0]) / len(steps)
+        if np.abs(steps - period).max() <= _EVEN * period:
+            return self
+        t = self.t[0] + period * np.arange(len(self.t))
+
+        def at(values: Array) -> Array:
+            return np.stack([np.interp(t, self.t, column) for column in values.T], axis=1)
+
+        qd = None if self.qd is None else at(self.qd)
+        clipped = at(self.clipped.astype(np.float64)) > 0
+        return attrs.evolve(self, t=t, q=at(self.q), effort=at(self.effort), qd=qd, clipped=clipped)
+
+
+def with_gains(log: Log, gains: ArrayLike) -> Log:
+    """Return a log of currents as one of efforts.
+
+    Args:
+        log: its ``effort`` are currents [A].
+        gains: (n,) effort at the joint per current [N m/A] or [N/A]; negative where they count the other way.
+
+    Raises:
+        ShapeError: there are not n gains.
+    """
+    return attrs.evolve(log, effort=log.effort * exact_shape(gains, (log.n,), "gains", LARGEST))
+
+
+def _clipped(effort: Array) -> Flags:
+    """Return which readings (k, n) are several equal ones in a row, the largest of their joint."""
+    result = np.zeros(effort.shape, dtype=np.bool_)
+    for joint, values in enumerate(effort.T):
+        for limit in {values.max(), values.min()}:
+            at_limit = values == limit
+            # Beginnings and ends of runs at the limit.
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], at_limit.astype(np.int8), [0]])))
+            for first, last in zip(edges[::2], edges[1::2], strict=True):
+                # A log that stands still all the time is not clipped.
+                result[first:last, joint] |= last - first >= _CLIPPED and last - first < len(values) // 2
+    return result
