@@ -218,9 +218,8 @@ class _Beside:
         where = [f"'{name}' at {position:g}" for name, position in self._positions.items()]
         if not where:
             return []
-        return [
-            f"joints beside the chain are held, with what they carry: {listed(where, MAX_LISTED)} rad or m (--lock)"
-        ]
+        held = listed(where, MAX_LISTED)
+        return [f"joints beside the chain are held, with what they carry: {held} rad or m (--lock)"]
 
 
 def _carries_mass(tree: Tree, joint: TreeJoint) -> bool:

@@ -298,11 +298,8 @@ def _followers(joints: Mapping[str, UrdfJoint], lock: Mapping[str, float]) -> It
             continue
         leader, multiplier, offset = joint.mimic
         if (before := whole.get(leader)) is not None:
-            leader, multiplier, offset = (
-                before.joint,
-                multiplier * before.multiplier,
-                multiplier * before.offset + offset,
-            )
+            leader, offset = before.joint, multiplier * before.offset + offset
+            multiplier *= before.multiplier
         whole[name] = Mimic(leader, multiplier, offset)
         follower = attrs.evolve(joint, mimic=whole[name])
         yield follower.held(whole[name].position(lock[leader])) if leader in lock else follower
