@@ -131,7 +131,7 @@ def test_a_gripper_at_rest(read: Callable[..., Arm], tmp_path: Path) -> None:
 
     assert arm.links[0].mass == 8
     (note,) = reading.notes
-    assert note.endswith("with the mass that they carry: 'left_slide' at 0, 'right_slide' at 0 rad or m (--lock)")
+    assert note.endswith("with what they carry: 'left_slide' at 0, 'right_slide' at 0 rad or m (--lock)")
     np.testing.assert_allclose(opened.links[0].com - arm.links[0].com, opened.base[:3, :3].T @ (0, 2 * 2 * 0.5 / 8, 0))
     assert [each.name for each in (*opened.joints, *opened.links)] == ["turn", "arm"]
     (tmp_path / "again.urdf").write_text(urdf_text(opened))
@@ -152,6 +152,32 @@ def test_a_follower_on_the_chain(read: Callable[..., Arm]) -> None:
     arm = read(ARM_WITH_GRIPPER, tip="right", lock={"left_slide": 0.3})
     assert arm.n == 1
     np.testing.assert_allclose(forward(arm, [0.0])[:3, 3], (0.5, 0.3, 0.0), atol=1e-15)
+
+
+def test_long_chains_of_followers(read: Callable[..., Arm]) -> None:
+    """Thousands of joints that follow one another are held where they follow to; where that is nowhere they are not."""
+    count, axis = 3000, '<axis xyz="0 1 0"/>'
+
+    def text(multiplier: float) -> str:
+        fingers = [link(f"finger_{i}", MASS) for i in range(count)]
+        slides = [
+            plain_joint(
+                f"slide_{i}", "prismatic", "arm", f"finger_{i}",
+                f'{axis}{LIMIT}<mimic joint="slide_{i - 1}" multiplier="{multiplier}"/>' if i else axis + LIMIT,
+            )
+            for i in range(count)
+        ]  # fmt: skip
+        ends = link("base"), link("arm", MASS), link("hand")
+        turn, weld = plain_joint("turn", "continuous", "base", "arm"), plain_joint("weld", "fixed", "arm", "hand")
+        return robot(*ends, turn, weld, *fingers[::-1], *slides[::-1])
+
+    arm = read(text(-1.0), tip="hand", lock={"slide_0": 1.5})
+    assert arm.links[0].mass == 2 * (count + 1)
+    np.testing.assert_allclose(arm.links[0].com, 0.0, atol=1e-12)
+    with pytest.raises(
+        FileFormatError, match=r"joint 'slide_40': it would be held at 1\.09951e\+12 .rad or m.; expected"
+    ):
+        read(text(2.0), tip="hand", lock={"slide_0": 1.0})
 
 
 def test_two_arms(read: Callable[..., Arm]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.model import Link
-from armwright.arm.tree.kinematic_tree import Tree, TreeJoint, quoted, resting_position
+from armwright.arm.tree.kinematic_tree import MAX_LISTED, Tree, TreeJoint, quoted, resting_position
 from armwright.arrays import Array
 from armwright.errors import listed, one_of
 from armwright.files.limits import limit, limit_message
@@ -190,12 +190,11 @@ class _Beside:
 
     def _position(self, joint: TreeJoint) -> float | None:
         """Return where a joint is held, a follower where it follows to; None where nothing holds it."""
-        if joint.name in self._chain or not joint.holdable:
+        leader = joint if joint.mimic is None else self._joints[joint.mimic.joint]
+        if leader.name in self._chain or not joint.holdable or not (leader.holdable or leader.fixed):
             return None
-        if joint.mimic is None:
-            return resting_position(joint.limits()[0])
-        position = self._position(self._joints[joint.mimic.joint])
-        return None if position is None else joint.mimic.multiplier * position + joint.mimic.offset
+        position = 0.0 if leader.fixed else resting_position(leader.limits()[0])
+        return position if joint.mimic is None else joint.mimic.position(position)
 
     def refuse_loads(self) -> None:
         """Refuse joints that nothing holds and that carry something: how that moves, a serial arm does not know.
@@ -215,16 +214,12 @@ class _Beside:
             )
 
     def notes(self) -> list[str]:
-        """Return a sentence on the joints that are held and carry mass, and where."""
-        held = {
-            name: position
-            for name, position in self._positions.items()
-            if _carries_mass(self._tree, self._joints[name])
-        }
-        if not held:
+        """Return a sentence on the joints that are held, and where."""
+        where = [f"'{name}' at {position:g}" for name, position in self._positions.items()]
+        if not where:
             return []
-        where = listed([f"'{name}' at {position:g}" for name, position in held.items()], len(held))
-        return [f"joints beside the chain are held, with the mass that they carry: {where} rad or m (--lock)"]
+        held = listed(where, MAX_LISTED)
+        return [f"joints beside the chain are held, with what they carry: {held} rad or m (--lock)"]
 
 
 def _carries_mass(tree: Tree, joint: TreeJoint) -> bool:

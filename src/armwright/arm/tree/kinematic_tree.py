@@ -15,7 +15,7 @@ from armwright.errors import FileFormatError, InvalidValueError, KindError, list
 from armwright.spatial.shapes import Solid
 
 # So many names are in a message.
-_MAX_LISTED = 50
+MAX_LISTED = 50
 # Joints that are held: their names, or their positions by their names [rad] or [m].
 Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
@@ -32,6 +32,10 @@ class Mimic(NamedTuple):
     joint: str
     multiplier: float
     offset: float
+
+    def position(self, leading: float) -> float:
+        """Return the position for one of the other joint."""
+        return self.multiplier * leading + self.offset
 
 
 class TreeJoint(Protocol):
@@ -80,7 +84,7 @@ class TreeJoint(Protocol):
 
     @property
     def mimic(self) -> Mimic | None:
-        """The joint that it follows; None of one that is free."""
+        """What it follows, a joint that follows none or is held; None of one that is free."""
 
     @property
     def holdable(self) -> bool:
@@ -153,7 +157,7 @@ class Tree(Protocol):
 
 def quoted(names: Sequence[str]) -> str:
     """Return names in quotes for a message, not more than some of them."""
-    return listed([f"'{name}'" for name in names], _MAX_LISTED)
+    return listed([f"'{name}'" for name in names], MAX_LISTED)
 
 
 def locked_positions(lock: Lock) -> dict[str, float]:

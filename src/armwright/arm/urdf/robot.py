@@ -18,7 +18,7 @@ from armwright.arm.tree.kinematic_tree import Mimic, check_lock, quoted
 from armwright.arm.urdf.elements import Element, origin_of, read_elements
 from armwright.arm.urdf.geometry import has_unread_shapes, solids_of
 from armwright.arm.urdf.meshes import MeshFiles
-from armwright.arrays import Array
+from armwright.arrays import LARGEST_ANGLE, Array
 from armwright.errors import FileFormatError, closest, one_of
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import homogeneous
@@ -102,12 +102,22 @@ class UrdfJoint:
         return self.kind in _MOVING
 
     def held(self, position: float) -> UrdfJoint:
-        """Return it as one that is held at a position [rad] or [m]."""
+        """Return it as one that is held at a position [rad] or [m].
+
+        Raises:
+            FileFormatError: it cannot be that far away.
+        """
+        if not abs(position) <= LARGEST_ANGLE:
+            raise self.error(f"it would be held at {position:g} (rad or m); expected at most {LARGEST_ANGLE:g}")
         return attrs.evolve(self, kind="fixed", locked=position)
 
     def error(self, message: str) -> FileFormatError:
         """Return the error that says ``message`` of the joint."""
         return self.element.error("", message)
+
+    def mimic_error(self, attribute: str, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of what the joint follows."""
+        return self.element.require("mimic").error(attribute, message)
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -120,11 +130,11 @@ class UrdfJoint:
         if self.kind not in _MOVING:
             raise self.element.error("type", f"an arm cannot have a {self.kind} joint; expected {', '.join(_MOVING)}")
         if self.mimic is not None:
-            master = self.mimic.joint
-            raise self.element.require("mimic").error(
+            leader = self.mimic.joint
+            raise self.mimic_error(
                 "",
-                f"the joint mimics '{master}'; an arm can only have independent joints: choose a tip before it, or "
-                f"lock '{master}', which holds this one where it follows to: lock=['{master}'] (--lock {master})",
+                f"the joint mimics '{leader}'; an arm can only have independent joints: choose a tip before it, or "
+                f"lock '{leader}', which holds this one where it follows to: lock=['{leader}'] (--lock {leader})",
             )
 
 
@@ -220,7 +230,7 @@ def read_robot(
         child_joints[joint.parent].append(joint)
     for name in lock:
         one_of("joint", name, names)
-    for joint in _held_followers(names, lock):
+    for joint in _followers(names, lock):
         parent_joints[joint.child] = joint
         child_joints[joint.parent] = [joint if each.name == joint.name else each for each in child_joints[joint.parent]]
     if not links:
@@ -266,22 +276,33 @@ def _mimic(element: Element) -> Mimic | None:
     return Mimic(mimic.text("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
 
 
-def _held_followers(joints: Mapping[str, UrdfJoint], lock: Mapping[str, float]) -> Iterator[UrdfJoint]:
-    """Give the joints that are held because what they follow is, each where it follows to; check whom all follow."""
+def _followers(joints: Mapping[str, UrdfJoint], lock: Mapping[str, float]) -> Iterator[UrdfJoint]:
+    """Give the joints that follow others, each as it follows one that follows none; held where that one is."""
+    leaders: dict[str, list[str]] = {}
     for joint in joints.values():
-        position, chain = (0.0, 1.0), [joint]
-        while (mimic := chain[-1].mimic) is not None and chain[-1].name not in lock:
-            if mimic.joint not in joints:
-                near = closest(mimic.joint, joints)
+        if joint.mimic is not None and joint.name not in lock:
+            if joint.mimic.joint not in joints:
+                near = closest(joint.mimic.joint, joints)
                 hint = f"; did you mean '{near}'?" if near else ""
-                raise chain[-1].element.require("mimic").error("joint", f"there is no joint '{mimic.joint}'{hint}")
-            position = position[0] + position[1] * mimic.offset, position[1] * mimic.multiplier
-            chain.append(joints[mimic.joint])
-            if chain[-1] in chain[:-1]:
-                names = quoted(sorted({each.name for each in chain}))
-                raise joint.element.require("mimic").error("joint", f"joints follow one another in a cycle: {names}")
-        if len(chain) > 1 and chain[-1].name in lock:
-            yield joint.held(position[0] + position[1] * lock[chain[-1].name])
+                raise joint.mimic_error("joint", f"there is no joint '{joint.mimic.joint}'{hint}")
+            leaders[joint.name] = [joint.mimic.joint]
+    try:
+        order = list(TopologicalSorter(leaders).static_order())
+    except CycleError as error:
+        cycle = sorted(set(error.args[1]))
+        raise joints[cycle[0]].mimic_error("joint", f"joints follow one another in a cycle: {quoted(cycle)}") from None
+    whole: dict[str, Mimic] = {}
+    for name in order:
+        joint = joints[name]
+        if name not in leaders or joint.mimic is None:
+            continue
+        leader, multiplier, offset = joint.mimic
+        if (before := whole.get(leader)) is not None:
+            leader, offset = before.joint, multiplier * before.offset + offset
+            multiplier *= before.multiplier
+        whole[name] = Mimic(leader, multiplier, offset)
+        follower = attrs.evolve(joint, mimic=whole[name])
+        yield follower.held(whole[name].position(lock[leader])) if leader in lock else follower
 
 
 def _refuse_cycles(robot: Robot) -> None:
