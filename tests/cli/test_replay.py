@@ -1,6 +1,7 @@
 """``armwright run --log``, ``simulate --log`` and ``replay`` as a user calls them."""
 
 import json
+import math
 import re
 from pathlib import Path
 
@@ -104,6 +105,32 @@ def test_log_of_others(strange: Path, tmp_path: Path) -> None:
     refused = armwright("replay", strange, "--arm", "puma560")
     assert refused.returncode != 0
     assert "/js_desired: 3 joints, but puma560 has 6" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "states",
+    [
+        [{"position": [1, 2, 3]}],
+        [{"position": [1, 2, 3]}] * 4,
+        [{"velocity": [1, 2, 3]}, {"effort": [1, 2, 3]}] * 4,
+        [{"position": [0.1 * i, math.nan if i % 3 else 1, 2], "effort": [1, 2, 3]} for i in range(9)],
+    ],
+    ids=["one", "at rest", "no positions", "holes"],
+)
+def test_poor_logs(states: list[dict[str, list[float]]], tmp_path: Path) -> None:
+    """A log of one state, without positions or with holes is shown as far as it goes, with an arm and without."""
+    messages = [
+        (channel, i * 10**7, json.dumps({"name": [*NAMES], **state}).encode())
+        for i, state in enumerate(states)
+        for channel in (0, 1)
+    ]
+    kind = ("sensor_msgs/msg/JointState", "json", "jsonschema", b"{}")
+    log = mcap_file(tmp_path / "a.mcap", [("/left", *kind), ("/right <b>", *kind)], messages)
+    for more in ((), ("--arm", "ntu-3r")):
+        done = armwright("replay", log, *more, "-o", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        assert "/right <b>: no plan beside it" in done.stdout
+        assert "/right <b>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8").split("<script")[0]
 
 
 def test_plan_of_another_log(strange: Path, tmp_path: Path) -> None:

@@ -31,7 +31,8 @@ from armwright.report.log_content import run_log_content, simulation_log_content
 from armwright.report.log_files import log_files, require_log_library
 from armwright.report.ros2_log import ros2_bag
 from armwright.simulation.simulator import simulate
-from armwright.spatial.shapes import Box, Capsule
+from armwright.spatial.shapes import Box, Capsule, Mesh
+from oracles.stocked_cell import stocked_run
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Positions are written to a nanometre, quaternions to 1e-12.
@@ -252,6 +253,36 @@ def test_scene(recording: Recording, in_mcap: Messages, in_bag: Messages) -> Non
                     if one.kind == "spheres"
                 )
         assert {one.frame for one in shapes} >= {f"part/{name}" for name in recording.cell.parts}
+
+
+def test_every_shape(tmp_path: Path) -> None:
+    """Boxes, cylinders, a ball and a mesh are in both formats, and two arms and held parts move by their frames."""
+    stocked = stocked_run(tmp_path)
+    content = run_log_content(stocked)
+    (tmp_path / "log.mcap").write_bytes(mcap_log(content))
+    for name, data in ros2_bag(content).items():
+        (tmp_path / name).write_bytes(data)
+    in_mcap, in_bag = mcap_messages(tmp_path / "log.mcap"), bag_messages(tmp_path / "bag.mcap")
+
+    for shapes in shown(in_mcap, in_bag):
+        there = {(one.frame, one.kind) for one in shapes}
+        assert there >= {("part/BLOCK", "cubes"), ("part/ROD", "cylinders"), ("part/WEDGE", "triangles")}
+        sizes = {tuple(np.round(one.size * 1e3, 6)) for one in shapes if one.frame == "world"}
+        assert sizes >= {(120, 90, 60), (20, 220, 200), (50, 50, 300), (100, 100, 100)}
+    mesh = stocked.cell.parts["WEDGE"].shape
+    assert isinstance(mesh, Mesh)
+    ((_, _, scene),) = in_mcap["/scene"]
+    (triangles,) = next(one for one in scene["entities"] if one["id"] == "part/WEDGE")["triangles"]
+    corners = np.array([list(triangles["points"][i].values()) for i in triangles["indices"]])
+    np.testing.assert_allclose(corners, mesh.vertices[mesh.faces.ravel()], atol=1e-6)
+    ((_, _, scene),) = in_bag["/scene"]
+    (marker,) = (one for one in scene.markers if one.ns == "part/WEDGE")
+    np.testing.assert_allclose([(one.x, one.y, one.z) for one in marker.points], corners, atol=1e-6)
+    assert {"/ARM_1/planned/joint_states", "/ARM_2/planned/joint_states"} <= set(in_mcap)
+    for instants in transforms(in_mcap, in_bag):
+        carried = [in_world(frames, "part/BLOCK") for frames in instants]
+        assert np.ptp([X[2, 3] for X in carried]) > 0.05
+        np.testing.assert_allclose(carried[-1][:2, 3], (0.55, 0.28), atol=1e-3)
 
 
 def test_trace_and_pictures(recording: Recording, in_mcap: Messages, in_bag: Messages) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from armwright.arm.load import arm_names, load_arm
 from armwright.arrays import Array
 from armwright.cell.observations import MeasuredStream, Picture
 from armwright.cell.part_poses import PartTrack
@@ -19,6 +20,7 @@ from armwright.physics.cell_bodies import arm_bodies
 from armwright.physics.collisions import StageClearance
 from armwright.program.vm.recording import Recording, Stream
 from armwright.report.animation import Animation, Body, MovedPart
+from armwright.report.arm_figure import Placed, arm_figure
 from armwright.report.markup import json_text
 from armwright.report.page import RunPage, run_page
 from armwright.report.run_data import run_page_data
@@ -152,6 +154,16 @@ def test_fingers_stop_at_the_part(stocked: Recording) -> None:
     assert figure.opening == 0.09
     np.testing.assert_allclose(figure.grip[held], 40 / 90, atol=1e-9)
     assert figure.grip[-1] == 1.0
+
+
+@pytest.mark.parametrize("name", arm_names())
+def test_every_arm_is_drawn(name: str) -> None:
+    """Every arm of the catalogue has a figure, one whose last link has no length too."""
+    arm = load_arm(name)
+
+    figure = arm_figure(name, Placed(arm), np.zeros((2, arm.n)), None, ShapeTable())
+
+    assert {body.frame for body in figure.bodies} >= set(range(arm.n))
 
 
 def test_a_column_below_a_raised_arm(tmp_path: Path) -> None:

@@ -263,12 +263,13 @@ def _delay(t: Array, plan: Array, t_seen: Array, seen: Array, duration: float) -
     inner = (t_seen >= t[0] + longest) & (t_seen <= t[-1] - longest)
     x, y = (t_seen[inner], seen[inner]) if inner.sum() > 10 and np.ptp(seen[inner]) > _STILL else (t_seen, seen)
 
-    def errors(late: float) -> Array:
-        error = y - np.interp(x - late, t, plan)
+    def errors(late: float, rows: slice = slice(None)) -> Array:
+        error = y[rows] - np.interp(x[rows] - late, t, plan)
         return np.asarray(error - error.mean())
 
+    few = slice(None, None, max(1, len(x) // _MAX_INSTANTS))
     late = min(
-        np.linspace(-longest, longest, 201).tolist(), key=lambda one: (float((errors(one) ** 2).sum()), abs(one))
+        np.linspace(-longest, longest, 201).tolist(), key=lambda one: (float((errors(one, few) ** 2).sum()), abs(one))
     )
     deviation = math.nan
     for _ in range(_MAX_STEPS):

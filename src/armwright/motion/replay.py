@@ -186,7 +186,8 @@ def _motion(
 ) -> ReplayedMotion:
     measured = log.topics[pair.measured]
     planned = None if pair.planned is None else plans.topics[pair.planned]
-    name = next((name for name in arms if name.lower() in pair.measured.lower()), None)
+    # Of ARM_1 and ARM_12 the longer one that fits.
+    name = max((name for name in arms if name.lower() in pair.measured.lower()), key=len, default=None)
     if name is None and len(arms) == 1:
         name = next(iter(arms))
     arm = None if name is None else arms[name]

@@ -105,6 +105,9 @@ def _guessed(name: str, placed: Placed, solids: list[SolidBody]) -> Iterator[tup
             radii[body.link] = max(radii[body.link], shape.radius)
         yield _body(body.name, body.solid.pose, body.link, "base" if body.link == 0 else "link"), shape
     radius, length = _CAP if placed.as_checked else _DRUM
+    for i in range(1, arm.n + 1):
+        # A link without length has no body; its joint is as wide as the link before it.
+        radii[i] = radii[i] or radii[i - 1] or radii.max()
     for i in range(arm.n):
         shape = Cylinder(radius=radius * radii[i + 1], length=length * radii[i + 1])
         yield _body(f"{name} joint {i + 1}", np.eye(4), i, "joint"), shape

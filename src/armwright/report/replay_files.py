@@ -48,7 +48,7 @@ def replay_files(
         for motion, name in zip(replay.motions, _figure_names(len(replay.motions)), strict=True)
     ]
     beside = {"summary.json": "all numbers, in SI units", **{f"{one.name}.svg": one.caption for one in drawn}}
-    known = [motion for motion in replay.motions if motion.arm is not None]
+    known = [motion for motion in replay.motions if motion.arm is not None and _can_move(motion)]
     if known:
         page = run_page(_page(replay, known, title=title, command=command, bases=bases, cell=cell))
     else:
@@ -65,6 +65,11 @@ def replay_files(
         )
     data = json.dumps(replay.as_data(), indent=2, ensure_ascii=False) + "\n"
     return {"summary.json": data, **{f"{drawing.name}.svg": drawing.svg for drawing in drawn}, "report.html": page}
+
+
+def _can_move(motion: ReplayedMotion) -> bool:
+    """Whether all positions are known at two times or more."""
+    return int(np.isfinite(motion.measured.q).all(axis=1).sum()) > 1
 
 
 def _figure_names(count: int) -> list[str]:
