@@ -1,4 +1,4 @@
-"""The arms of the catalogue against the papers that they come from, and against what can be worked out by hand."""
+"""Arms of the catalogue against the papers that they come from, and against what can be worked out by hand."""
 
 import math
 
@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm
 from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
@@ -42,14 +42,6 @@ TABLES = {
     "ntu-3r": ((90, 0, 90), (0, 0.4, 0), (0.076, 0, -0.012), (0, 90, 0)),
     "ur5": ((90, 0, 0, 90, -90, 0), (0, -0.425, -0.39225, 0, 0, 0), (0.089159, 0, 0, 0.10915, 0.09465, 0.0823), 0),
 }
-
-
-def test_every_arm_has_a_source() -> None:
-    """Every arm of the catalogue says what it is and where its numbers come from, and has its table below."""
-    assert set(arm_names()) == set(TABLES)
-    for name in arm_names():
-        assert load_arm(name).title
-        assert load_arm(name).source
 
 
 @pytest.mark.parametrize("name", TABLES)

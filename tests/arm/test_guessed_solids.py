@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from armwright.arm.guessed_solids import guessed_radii, guessed_solids
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.spatial.shapes import Capsule, Sphere
 from oracles.arms import random_arm
+from oracles.catalogue import FEW, NAMES
 
 
 def ends_of(shape: Capsule | Sphere, X: Array) -> list[Array]:
@@ -18,7 +19,8 @@ def ends_of(shape: Capsule | Sphere, X: Array) -> list[Array]:
     return [X[:3, 3] + side * shape.length / 2 * X[:3, 2] for side in (-1, 1)]
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_chain_of_capsules(name: str, rng: np.random.Generator) -> None:
     """Each link of a revolute arm begins within the guessed radius of the axis of its joint, and ends at its frame."""
     arm = load_arm(name)

@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 
 from armwright.arm.limits import Limits
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.payloads import payload
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.spatial.rotations import exact_cosine, exact_sine
 from armwright.spatial.shapes import Box
 from oracles.arms import random_arm
+from oracles.catalogue import FEW, NAMES
 
 
 def arrays_of(thing: Any) -> list[np.ndarray]:
@@ -38,7 +39,8 @@ def parts_of(arm: Arm) -> list[object]:
     return [*arm.joints, *arm.links, *arm.motors]
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_arrays_cannot_be_written(name: str) -> None:
     """No number of an arm that was loaded can be changed: not in its poses, gravity, centres of mass or tensors."""
     arm = load_arm(name)
@@ -85,7 +87,8 @@ def test_equal_arms(rng: np.random.Generator) -> None:
     assert attrs.evolve(arm, links=[*arm.links[:2], heavier]) != arm
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_equal_arms_hash_equal(name: str) -> None:
     """An arm is a key: one that is read again finds what was kept for the first, a heavier one does not."""
     arm, again = load_arm(name), load_arm(name)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from armwright.arm.limits import Limits
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Motor
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
@@ -21,6 +21,7 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from oracles.arms import random_arm, squared
+from oracles.catalogue import FEW, NAMES
 from oracles.urdf import oracle
 from samples import examples
 
@@ -83,7 +84,8 @@ def test_pinocchio_reads_it(joints: int, *, built: bool, rng: np.random.Generato
     near(mass_matrix(arm, q, drives=False), known.mass_matrix(q), AGREEMENT)
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue(name: str, rng: np.random.Generator, back: Callable[[Arm], Arm]) -> None:
     """Every arm of the catalogue survives, with its limits, its bodies and its build."""
     arm = load_arm(name)

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from armwright.arm.limits import Limits
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.arm.write import toml_text
 from armwright.errors import InvalidValueError
 from oracles.arms import random_arm, squared
+from oracles.catalogue import FEW, NAMES
 from samples import examples
 
 
@@ -29,7 +30,8 @@ def back(tmp_path: Path) -> Callable[[Arm], Arm]:
     return there_and_back
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue(name: str, back: Callable[[Arm], Arm]) -> None:
     """Every arm of the catalogue comes back equal, every number to the last bit."""
     assert back(load_arm(name)) == load_arm(name)

@@ -4,13 +4,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import Chain, kinematic_chain
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from calibration.simulated import configurations, random_arm, random_errors, random_pose
+from oracles.catalogue import FEW, NAMES
 
 # Some thirty turns and shifts, each rounded.
 ROUNDING = 1e-13
@@ -55,7 +56,8 @@ def product(chain: Chain, q: Array, errors: npt.NDArray[np.complex128]) -> Compl
     return X
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_no_errors(name: str, rng: np.random.Generator) -> None:
     """An arm without errors has its tool where forward kinematics has it, for every arm of the catalogue."""
     arm = load_arm(name)

@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import arm_names, arm_summaries, load_arm
 from armwright.arm.model import Motor
 from cli_calls import armwright
+from oracles.catalogue import FEW, NAMES
 
 HEADINGS = ("Denavit-Hartenberg", "Limits", "Links", "Drives")
 LIFT = """
@@ -29,37 +30,53 @@ mass_kg = 3
 coulomb_backward_N = 4
 """
 
-KNOWN = "Known: ntu-3r, puma560, puma560-seed, stanford, stanford-jpl, ur5."
+KNOWN = f"All {len(NAMES)}: armwright arms."
 
 
 def test_the_catalogue() -> None:
     """Every arm of the catalogue is listed on a line of its own that fits 80 columns, with its title."""
     result = armwright("arms")
 
-    head, *lines = result.stdout.splitlines()
+    table, _, below = result.stdout.partition("\n\n")
+    head, *lines = table.splitlines()
     assert result.returncode == 0
     assert head.split() == ["name", "joints", "title"]
     assert tuple(line.split()[0] for line in lines) == arm_names()
-    assert all(load_arm(line.split()[0]).title in line for line in lines)
-    assert max(map(len, lines)) <= 80
+    assert all(each.title in line for each, line in zip(arm_summaries(), lines, strict=True))
+    assert max(map(len, result.stdout.splitlines())) <= 80
+    confirmed = below.partition(".")[0].removeprefix("Geometry of two documents: ").replace("\n", " ").split(", ")
+    assert {"panda", "ur5e"} <= set(confirmed) <= set(arm_names()) - {"ntu-3r", "ur5", "irb120"}
 
 
 def test_the_catalogue_for_programs() -> None:
-    """With --json the catalogue is a list of names, numbers of joints, titles and sources."""
+    """With --json the catalogue is a list of names, numbers of joints, titles, sources and documents."""
     rows = json.loads(armwright("arms", "--json").stdout)
 
-    assert {row["name"]: row["joints"] for row in rows} == {
-        "ntu-3r": 3,
-        "puma560": 6,
-        "puma560-seed": 6,
-        "stanford": 6,
-        "stanford-jpl": 6,
-        "ur5": 6,
-    }
+    joints = {row["name"]: row["joints"] for row in rows}
+    assert tuple(joints) == arm_names()
+    some = {"ntu-3r": 3, "cobra600": 4, "m430ia-2f": 5, "puma560": 6, "ur5": 6, "panda": 7}
+    assert some.items() <= joints.items()
     assert all(row["title"] and row["source"] for row in rows)
+    gives = {quantity for row in rows for document in row["documents"] for quantity in document["gives"]}
+    assert {"geometry", "speeds", "masses"} <= gives
 
 
-@pytest.mark.parametrize("name", arm_names())
+def test_documents_of_the_catalogue() -> None:
+    """With --sources every arm has lines of its documents: what each gives, its place, revision and licence."""
+    lines = armwright("arms", "--sources").stdout.splitlines()
+
+    at = lines.index("irb6700-200-260: ABB IRB 6700-200/2.60")
+    assert lines[at + 1] == (
+        "  geometry, positions, speeds: ABB IRB 6700-200/2.60 as URDF, ros-industrial/abb, "
+        "abb_irb6700_support/urdf/irb6700_200_260_macro.xacro, revision 655ec59ec75a0a69333c6ce3c2af5c400c45bc7b, "
+        "BSD-3-Clause"
+    )
+    assert sum(not line.startswith(" ") for line in lines) == len(NAMES)
+    assert any(line.startswith("  confirms geometry: ") for line in lines)
+
+
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_tables_fit_the_screen(name: str) -> None:
     """At 80 columns every table is whole: no number is cut off, no line is longer."""
     result = armwright("show", name)
@@ -99,7 +116,8 @@ def test_numbers_of_a_slide() -> None:
     assert ["3", "140 mm", "1117.6 mm", "750 mm/s", "3000 mm/s²", "198 N"] in rows
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_json_is_si(name: str) -> None:
     """The JSON of an arm has every number of the model, in SI units and radians, and null for what is not limited."""
     data, arm = json.loads(armwright("show", name, "--json").stdout), load_arm(name)
@@ -208,6 +226,7 @@ def test_a_narrow_screen() -> None:
     [
         ("pumma560", "no arm 'pumma560'. Did you mean 'puma560'? " + KNOWN),
         ("", "no arm ''. " + KNOWN),
+        ("yaskawa", "no arm 'yaskawa'. Similar: gp12, gp25, gp7, gp8, hc10, sia20d. " + KNOWN),
         ("nothing.toml", "nothing.toml: no such file"),
         ("lfit.toml", "lfit.toml: no such file; did you mean 'lift.toml'?"),
         ("./", ".: expected a file, got a folder"),

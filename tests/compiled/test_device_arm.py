@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array
 from armwright.compiled import device_arm
@@ -14,6 +14,7 @@ from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.compiled.quantities import quantity_names
 from armwright.errors import DeviceError, InvalidValueError, KindError, MissingExtraError, ShapeError
 from armwright.kinematics.forward_kinematics import forward
+from oracles.catalogue import FEW, SIX_JOINTS
 from oracles.devices import FakeCuda, OnDevice
 
 
@@ -172,7 +173,8 @@ def test_names_of_the_library() -> None:
 
 
 @pytest.mark.cuda
-@pytest.mark.parametrize("name", [name for name in arm_names() if load_arm(name).n == 6])
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", SIX_JOINTS)
 def test_bits_on_a_device(name: str, rng: np.random.Generator) -> None:
     """Every quantity of an arm has the bits of the processor on a device."""
     arm = load_arm(name)

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.accelerations import forward_dynamics, toacc, unit_accelerations
 from armwright.dynamics.articulated_body import articulated_body
@@ -13,6 +13,7 @@ from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnsupportedArmError
 from oracles.arms import random_arm
+from oracles.catalogue import FEW_WITH_MASSES, WITH_MASSES
 from oracles.with_pinocchio import pinocchio_model
 
 AGREEMENT = 1e-9  # relative to the largest acceleration
@@ -33,7 +34,8 @@ def _compare(arm: Arm, rng: np.random.Generator) -> None:
         _agree(toacc(smooth, q, qd, 10 * tau), expected)
 
 
-@pytest.mark.parametrize("name", [name for name in arm_names() if load_arm(name).links[-1].mass])
+@pytest.mark.drawn(FEW_WITH_MASSES)
+@pytest.mark.parametrize("name", WITH_MASSES)
 def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> None:
     """Pinocchio gives the joints of every catalogue arm with masses the same accelerations, rotors included."""
     _compare(load_arm(name), rng)

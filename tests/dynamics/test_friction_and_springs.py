@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link, Motor, Spring
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
@@ -21,6 +21,7 @@ from armwright.dynamics.regressors import dynamic_parameters, regressor
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import InvalidValueError, KindError
 from oracles.arms import of_all_kinds, random_arm, random_configurations, with_all_friction, with_springs
+from oracles.catalogue import FEW_WITH_MASSES, WITH_MASSES
 from oracles.with_pinocchio import pinocchio_model
 from samples import Sample
 
@@ -184,7 +185,8 @@ def test_compiled(joints: int, rng: np.random.Generator) -> None:
             near(found, expected)
 
 
-@pytest.mark.parametrize("name", [name for name in arm_names() if name != "ntu-3r"])
+@pytest.mark.drawn(FEW_WITH_MASSES)
+@pytest.mark.parametrize("name", WITH_MASSES)
 def test_arms_without_them_pay_nothing(name: str) -> None:
     """The code of an arm that has none of this has no operation more than that of its viscous and dry friction."""
     arm = load_arm(name)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.lagrange_euler import (
@@ -18,6 +18,7 @@ from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import coriolis_efforts
 from armwright.kinematics.forward_kinematics import link_poses
 from oracles.arms import random_arm, random_link
+from oracles.catalogue import FEW, NAMES
 
 AGREEMENT = 1e-10  # relative to the largest number
 
@@ -32,7 +33,8 @@ def _compare(arm: Arm, rng: np.random.Generator) -> None:
     _agree(inertia_coefficients(pose_derivatives(arm, q)), composite_rigid_body(arm, q))
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue_against_newton_euler(name: str, rng: np.random.Generator) -> None:
     """Energies and free bodies lead to the same efforts on every catalogue arm."""
     _compare(load_arm(name), rng)

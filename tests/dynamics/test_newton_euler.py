@@ -5,12 +5,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import ShapeError
 from armwright.kinematics.jacobians import jacobian
 from oracles.arms import random_arm
+from oracles.catalogue import FEW, NAMES
 from oracles.with_pinocchio import pinocchio_model
 
 AGREEMENT = 1e-10  # relative to the largest effort
@@ -26,7 +27,8 @@ def _compare(arm: Arm, rng: np.random.Generator) -> None:
         np.testing.assert_allclose(tau, expected, atol=AGREEMENT * max(1.0, np.abs(expected).max()))
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> None:
     """Pinocchio asks the same efforts of the links of every catalogue arm."""
     _compare(load_arm(name), rng)

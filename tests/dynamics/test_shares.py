@@ -5,13 +5,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import ShapeError
 from oracles.arms import random_arm, random_configurations
+from oracles.catalogue import FEW, NAMES
 from oracles.with_pinocchio import pinocchio_model
 
 AGREEMENT = 1e-10  # relative to the largest number
@@ -32,7 +33,8 @@ def _compare(arm: Arm, rng: np.random.Generator) -> None:
         _agree(coriolis_efforts(arm, q, qd), pin.nonLinearEffects(model, data, q, qd) - gravity)
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> None:
     """Pinocchio finds the same mass matrix, gravity and Coriolis efforts of every catalogue arm."""
     _compare(load_arm(name), rng)

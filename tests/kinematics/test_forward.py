@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward_kinematics import forward, link_poses
@@ -13,6 +13,7 @@ from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 from oracles.arms import random_configurations
+from oracles.catalogue import FEW, NAMES
 from oracles.with_pinocchio import pinocchio_model
 
 ROUNDING = 1e-10  # agreement with an oracle that multiplies the same matrices in another order
@@ -84,7 +85,8 @@ def test_a_slide_moves_along_its_axis() -> None:
     np.testing.assert_allclose(long[:3, 3] - short[:3, 3], (0.2, 0.0, 0.0), atol=ROUNDING)
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> None:
     """Pinocchio puts the tool of every catalogue arm in the same place, and moves it the same way."""
     _compare(load_arm(name), rng)

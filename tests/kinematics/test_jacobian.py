@@ -4,13 +4,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import Axes, jacobian, jacobian_rate, tool_twist
 from armwright.kinematics.manipulability_index import manipulability
 from oracles.arms import random_arm, random_configurations
+from oracles.catalogue import FEW, NAMES
 from oracles.with_pinocchio import pinocchio_model
 
 ROUNDING = 1e-10  # agreement with an oracle that multiplies the same matrices in another order, arms of a few metres
@@ -38,7 +39,8 @@ def _against_pinocchio(arm: Arm, rng: np.random.Generator) -> None:
             np.testing.assert_allclose(tool_twist(arm, q, qd, frame), twist, atol=ROUNDING)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", arm_names())
+@pytest.mark.drawn(FEW)
+@pytest.mark.parametrize("name", NAMES)
 def test_rate_of_catalogue_arms_against_pinocchio(name: str, rng: np.random.Generator) -> None:
     """Pinocchio finds the same time derivative of the Jacobian and the same twist, in base and in tool axes."""
     _against_pinocchio(load_arm(name), rng)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.limits import Limits
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link, Motor
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
@@ -18,6 +18,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.physics.friction import dry_offsets
 from armwright.physics.plant import ArmIndices, add_arm, arm_indices, finish, new_world
 from oracles.arms import of_all_kinds, random_arm, random_pose
+from oracles.catalogue import FEW_WITH_MASSES, WITH_MASSES
 from samples import Sample
 
 # What the product of some dozen transforms loses.
@@ -56,7 +57,8 @@ def check_equations(arm: Arm, rng: np.random.Generator, states: int, base: Array
         np.testing.assert_allclose(data.site("A/tool").xmat.reshape(3, 3), X[:3, :3], rtol=0, atol=EXACT)
 
 
-@pytest.mark.parametrize("name", [name for name in arm_names() if name != "ntu-3r"])
+@pytest.mark.drawn(FEW_WITH_MASSES)
+@pytest.mark.parametrize("name", WITH_MASSES)
 def test_equations_of_the_catalogue(name: str, sample: Sample) -> None:
     """The world moves an arm of the catalogue as its own equations say, on the floor and under the ceiling."""
     rng, states = np.random.default_rng(sample.seed), 200 if sample.whole else 20

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.cell.control import Sensors
 from armwright.cell.model import Cell, CellArm
@@ -17,6 +17,7 @@ from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, reachable, without_pictures
+from oracles.catalogue import FEW_WITH_MASSES, WITH_MASSES
 from samples import Sample
 
 # Largest distances of tools from where they are sent, at SPEED 100 [m].
@@ -125,7 +126,8 @@ def other(arm: Arm, rng: np.random.Generator) -> Arm:
 
 
 @pytest.mark.share(0.05)
-@pytest.mark.parametrize("name", [name for name in arm_names() if name != "ntu-3r"])
+@pytest.mark.drawn(FEW_WITH_MASSES)
+@pytest.mark.parametrize("name", WITH_MASSES)
 def test_another_arm_than_believed(name: str, sample: Sample) -> None:
     """With wrong masses and friction, encoders of 13 bits and a late reading, every arm follows and comes to rest.
 

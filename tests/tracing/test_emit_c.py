@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.arm.load import arm_names, load_arm
+from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arm.positions import ranges
 from armwright.arrays import Array
@@ -27,6 +27,7 @@ from armwright.tracing.identifiers import identifier
 from armwright.tracing.scalar import Scalar, atan2, cbrt, exp, round_half_even, sqrt
 from oracles import compilers
 from oracles.arms import coupled, of_all_kinds, random_arm, with_all_friction, with_springs
+from oracles.catalogue import FEW, SIX_JOINTS
 from oracles.compilers import (
     COMPILERS,
     FMA,
@@ -51,7 +52,6 @@ LANGUAGES: dict[str, tuple[str, Language]] = {
     "clang++": ("clang++", "cpp"),
     FOR_DEVICE: ("g++", "cuda"),
 }
-SIX_JOINTS = [name for name in arm_names() if load_arm(name).n == 6]
 # What every text begins with that may differ where nothing else does.
 _HASH = re.compile(r"SHA-256 of the code: \w{64}|ARMWRIGHT_[0-9A-F]{16}_H")
 
@@ -247,8 +247,8 @@ def test_what_a_test_program_refuses(meddled: str, status: int, tmp_path: Path) 
     assert subprocess.run([program], capture_output=True, check=False).returncode == status
 
 
+@pytest.mark.drawn(0.02)
 @pytest.mark.parametrize("name", SIX_JOINTS)
-@pytest.mark.drawn(0.2)
 def test_float(name: str, tmp_path: Path, sample: Sample) -> None:
     """Efforts in float are off by at most a hundred-thousandth of their range."""
     arm, rng = load_arm(name), np.random.default_rng(sample.seed)
@@ -479,6 +479,7 @@ def test_cortex_m7_without_a_library(real: Real, tmp_path: Path) -> None:
     assert not called & {"fma", "fmaf"}
 
 
+@pytest.mark.drawn(FEW)
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_registers_of_a_device(name: str) -> None:
     """Inverse dynamics of an arm of six joints fits into 128 registers: nothing is spilled to memory."""

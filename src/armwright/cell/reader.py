@@ -35,8 +35,8 @@ from armwright.spatial.shapes import Mesh
 
 # Smallest distance of the bases of two arms [m].
 _MIN_BASE_DISTANCE = 0.01
-# Joints that are needed for any pose of the gripper.
-_MIN_JOINTS = 6
+# Arms of fewer joints than these cannot bring a part from one place to another and turn it.
+_MIN_JOINTS = 4
 # The arm of a cell whose file names none: that of the report.
 _DEFAULT_ARM = "stanford"
 # Servo periods [ms]: a shorter one fills the disk, a longer one controls nothing.
@@ -204,7 +204,7 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
     if arm.n < _MIN_JOINTS:
         raise table.error(
             "model",
-            f"'{arm.name}' has {arm.n} joints; moves specify position and orientation, which needs six or more",
+            f"'{arm.name}' has {arm.n} joints; an arm in a cell needs four or more",
         )
     try:
         weighed(arm)
