@@ -18,6 +18,7 @@ ALL = (
     "derivatives",
     "kinematics",
     "inverse_kinematics",
+    "inverse_classes",
     "one_call",
     "c_text",
     "scaling",

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
+from armwright.arm.write import toml_text
 from armwright.dynamics.equation_of_motion import terms
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import jacobian
 from cli_calls import armwright
+from oracles.published_arms import iiwa14
 
 Q_DEG = "10,20,30,40,50,60"
 Q = np.radians([10, 20, 30, 40, 50, 60])
@@ -75,6 +77,37 @@ def test_heads_have_units(call: tuple[str, ...], line: int, heads: str) -> None:
     head = armwright(*call).stdout.splitlines()[line]
 
     assert " ".join(head.split()).startswith(" ".join(heads.split()))
+
+
+def test_inverse_of_seven_joints(tmp_path: Path) -> None:
+    """The solutions at a swivel are printed with it, and the swivels within the limits; all of that is in the JSON."""
+    path = tmp_path / "iiwa14.toml"
+    path.write_text(toml_text(iiwa14()))
+    call = ("inverse", str(path), "--xyz", "400,100,400", "--rpy", "180,0,20", "--swivel", "-30")
+
+    lines = armwright(*call).stdout.splitlines()
+    data = json.loads(armwright(*call, "--json").stdout)
+
+    assert lines.count("    swivel -30.000 deg") == len(data["branches"]) == 8
+    assert "swivels within the limits, in deg:" in lines
+    assert {branch["swivel"] for branch in data["branches"]} == {np.radians(-30)}
+    inside = {one["label"] for one in data["swivels"] if one["lower"] <= np.radians(-30) <= one["upper"]}
+    assert {branch["label"] for branch in data["branches"] if branch["allowed"]} == inside
+
+
+@pytest.mark.parametrize(
+    ("arm", "swivel", "status", "said"),
+    [
+        ("ur5", "10", 3, "arm 'ur5' has no swivel"),
+        ("ur5", "best", 2, "expected a number or one of nearest, middle, farthest, got 'best'"),
+    ],
+)
+def test_what_is_no_swivel(arm: str, swivel: str, status: int, said: str) -> None:
+    """An arm of six joints has none, and another word is none."""
+    done = armwright("inverse", arm, "--xyz", "400,100,300", "--swivel", swivel)
+
+    assert done.returncode == status
+    assert said in " ".join(done.stderr.replace("│", "").split())
 
 
 def test_inverse_out_of_reach() -> None:

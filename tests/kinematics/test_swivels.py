@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import Arm, Limits
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import InvalidValueError, KindError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.redundancy import swivel_intervals, swivel_of
 from armwright.kinematics.inverse_kinematics.solution import Outcome
@@ -176,6 +176,8 @@ def test_what_is_no_swivel() -> None:
         inverse(arm, X, swivel="best")  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError, match="swivel: expected a finite number, got nan"):
         inverse(arm, X, swivel=float("nan"))
+    with pytest.raises(KindError, match="swivel: expected a"):
+        inverse(arm, X, swivel=None)  # type: ignore[arg-type]
     for ask in (lambda: swivel_of(xarm6(), np.zeros(6)), lambda: swivel_intervals(xarm6(), np.eye(4))):
         with pytest.raises(UnsupportedArmError, match="'xarm6' has no swivel; expected an arm of 7 joints"):
             ask()

@@ -1,4 +1,4 @@
-"""Arms whose numbers others have published, of classes that the catalogue has no example of."""
+"""Arms of classes that the catalogue has no example of: most with numbers that others have published."""
 
 import numpy as np
 
@@ -83,6 +83,18 @@ def sixteen() -> Arm:
     """The arm of Manseur & Doty (1989), "A robot manipulator with 16 real inverse kinematic solution sets"."""
     rows = [(0.0, 0.3, 90), (0.0, 1.0, 1), (0.2, 0.0, 90), (0.0, 1.5, 1), (0.0, 0.0, 90), (0.0, 1.0, 1)]
     return Arm(name="sixteen", joints=[_turning(d, a, np.radians(alpha)) for d, a, alpha in rows])
+
+
+def bent_wrist() -> Arm:
+    """An elbow arm whose wrist axes meet at 40 and 63 degrees, and whose first two axes are not at right angles."""
+    rows = [(0.3, 0.1, 0.8), (0.1, 0.4, 0.0), (0.05, 0.03, 1.2), (0.35, 0.0, 0.7), (0.0, 0.0, 1.1), (0.1, 0.05, 0.3)]
+    return Arm(name="bent-wrist", joints=[_turning(*row, theta=0.3) for row in rows])
+
+
+def skew_shoulder() -> Arm:
+    """Three parallel axes that are not at right angles to those before and after them."""
+    rows = [(0.3, 0.1, 0.8), (0.1, 0.4, np.pi), (0.05, 0.33, 0.0), (0.1, 0.06, 1.1), (0.1, 0.0, 0.8), (0.07, 0.03, 0.2)]
+    return Arm(name="skew-shoulder", joints=[_turning(*row, theta=0.3) for row in rows])
 
 
 def iiwa14() -> Arm:

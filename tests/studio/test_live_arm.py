@@ -1,11 +1,13 @@
 """Arms moved by hand: solutions against the plain inverse kinematics, steps that go on steadily, remarks."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
 from armwright.cell.model import CellArm
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
@@ -14,6 +16,7 @@ from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.studio.live_arm import LiveArm, UnreachableError
 from oracles.arms import random_configurations, random_pose
+from oracles.published_arms import cobra600, iiwa14, panda, wx250
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -65,6 +68,28 @@ def test_dragged_tool(name: str, sample: Sample) -> None:
             assert (arm.q >= arm.lower).all()
             assert (arm.q <= arm.upper).all()
     assert moved > 0
+
+
+@pytest.mark.parametrize("make", [cobra600, wx250, iiwa14, panda])
+def test_arms_of_other_classes(make: Callable[[], Arm], rng: np.random.Generator) -> None:
+    """Few joints and seven have solutions with names of their own; the tool is dragged steadily.
+
+    Few joints are led by the position of the tool where they cannot keep its orientation.
+    """
+    model = make()
+    q = 0.4 * model.limits.lower + 0.6 * model.limits.upper
+    arm = LiveArm("ARM_1", CellArm(arm=model, start=q, base=random_pose(rng)))
+
+    found = arm.solutions()
+
+    assert len({it.label for it in found}) == len(found) > 1
+    assert sum(it.here for it in found) == 1
+    for _ in range(5):
+        goal, before = arm.tool.copy(), arm.q
+        goal[:3, 3] += rng.normal(scale=0.003, size=3)
+        arm.move_tool(goal)
+        np.testing.assert_allclose(arm.tool[:3, 3], goal[:3, 3], atol=2e-6)
+        assert np.abs(arm.q - before).max() < np.radians(30.0)
 
 
 def test_out_of_reach() -> None:

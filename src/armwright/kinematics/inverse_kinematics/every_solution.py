@@ -3,8 +3,8 @@
 With complex joint positions nearly every pose of such an arm has the same number of configurations, sixteen at most
 with six revolute joints. They move steadily as the pose moves, and never meet on a way that is chosen at random. So
 once they are known for one complex pose, they are known for all: each is followed to the pose that is asked for, and
-the real ones are kept. For the first pose they are found from a single one, by going round in closed loops of poses,
-from which they come back exchanged.
+the real ones are kept. For the first pose they are found from configurations at random, which are followed to it from
+their own poses, and by going round in closed loops of poses, from which they come back exchanged.
 
 Source:
     Sommese & Wampler (2005), "The numerical solution of systems of polynomials", parameter continuation; Duff, Hill,
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -30,8 +30,10 @@ from armwright.spatial.rotations import rotation_vector
 
 Complex: TypeAlias = NDArray[np.complex128]
 
+# Configurations at random whose paths to the first pose begin to find all that it has.
+_SEEDS = 48
 # Loops that bring nothing new before the configurations are said to be all, and loops at most.
-_IDLE_LOOPS, _LOOPS = 8, 60
+_IDLE_LOOPS, _LOOPS = 6, 60
 # Complex joint positions closer than this are one [rad], in parts of the length of the arm for slides.
 _SAME = 1e-5
 # Ways tried to a pose, where paths of the first do not arrive.
@@ -52,7 +54,7 @@ _TWIST_ENTRIES = [3, 7, 11, 9, 2, 4]
 
 
 class _Pose(NamedTuple):
-    """A complex pose: quaternion and position in homogeneous coordinates, (4,) each; their scales do not matter."""
+    """Complex poses: quaternions and positions in homogeneous coordinates, (..., 4) each; scales do not matter."""
 
     rotation: Complex
     position: Complex
@@ -60,6 +62,10 @@ class _Pose(NamedTuple):
     def scaled(self, rotation: complex, position: complex) -> _Pose:
         """Return the same pose in other coordinates, to which another way leads."""
         return _Pose(self.rotation * rotation, self.position * position)
+
+    def of(self, rows: Any) -> _Pose:
+        """Return some of the poses."""
+        return _Pose(self.rotation[rows], self.position[rows])
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -124,7 +130,7 @@ def every_solution(arm: Arm, X: Array, near: Array) -> InverseSolution:
         q, arrived = _followed(fibre.chain, fibre.q, fibre.pose, target.scaled(*scales))
         ends.append(q)
         real.append(np.abs(q.imag).max(axis=-1) < np.where(arrived, _REAL, 10 * _REAL))
-        regular = bool(arrived.all()) and len(_distinct(fibre.chain, q)) == len(q)
+        regular = len(q) > 0 and bool(arrived.all()) and len(_distinct(fibre.chain, q)) == len(q)
         if regular:
             break
     starts = np.concatenate(ends).real[np.concatenate(real)]
@@ -135,12 +141,15 @@ def every_solution(arm: Arm, X: Array, near: Array) -> InverseSolution:
 
 @lru_cache(maxsize=64)  # found once for an arm, with some hundred paths
 def _fibre(arm: Arm) -> _Fibre:
-    """Return all configurations of an arm at some complex pose, found from one by going round in loops."""
+    """Return all configurations of an arm at some complex pose, found by paths from others and round in loops."""
     rng = np.random.default_rng(0)
     chain = _chain(arm)
-    q = rng.uniform(-math.pi, math.pi, size=(1, 6)) + 0.4j * rng.normal(size=(1, 6))
-    q = np.where(chain.revolute, q, 0.5 * _complex(rng, 6))
-    here, there = _pose(chain.displacements(q)[0][0]), _Pose(_complex(rng, 4), _complex(rng, 4))
+    shape = (_SEEDS, arm.n)
+    q = rng.uniform(-math.pi, math.pi, size=shape) + 0.4j * rng.normal(size=shape)
+    q = np.where(chain.revolute, q, 0.5 * _complex(rng, *shape))
+    here, there = _Pose(_complex(rng, 4), _complex(rng, 4)), _Pose(_complex(rng, 4), _complex(rng, 4))
+    q, arrived = _followed(chain, q, _poses(chain.displacements(q)[0]), here)
+    q = _distinct(chain, q[arrived])
     idle = 0
     for _ in range(_LOOPS):
         known = len(q)
@@ -177,12 +186,11 @@ def _target(arm: Arm, chain: _Chain, X: Array) -> _Pose:
     return _Pose(rotation.astype(np.complex128), position.astype(np.complex128))
 
 
-def _pose(T: Complex) -> _Pose:
-    """Return a complex displacement (4, 4) as a quaternion, scalar first, and a position."""
-    R = T[:3, :3]
-    w = np.sqrt(1 + np.trace(R)) / 2
-    v = np.array((R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])) / (4 * w)
-    return _Pose(np.array((w, *v)), np.append(T[:3, 3], 1.0))
+def _poses(T: Complex) -> _Pose:
+    """Return complex displacements (k, 4, 4) as quaternions, scalar first, and positions."""
+    w = np.sqrt(np.trace(T, axis1=-2, axis2=-1)) / 2
+    v = np.stack([T[:, 2, 1] - T[:, 1, 2], T[:, 0, 2] - T[:, 2, 0], T[:, 1, 0] - T[:, 0, 1]], axis=-1)
+    return _Pose(np.concatenate([w[:, None], v / (4 * w[:, None])], axis=-1), T[..., 3].copy())
 
 
 def _crossing(v: Complex) -> Complex:
@@ -192,12 +200,12 @@ def _crossing(v: Complex) -> Complex:
     return np.asarray(K - np.swapaxes(K, -1, -2))
 
 
-def _complex(rng: np.random.Generator, count: int) -> Complex:
-    return np.asarray(rng.normal(size=count) + 1j * rng.normal(size=count))
+def _complex(rng: np.random.Generator, *shape: int) -> Complex:
+    return np.asarray(rng.normal(size=shape) + 1j * rng.normal(size=shape))
 
 
 def _on_way(start: _Pose, goal: _Pose, t: Array) -> tuple[Complex, Complex, Complex]:
-    """Return rotations (k, 3, 3), positions (k, 3) and velocities (k, 6) on the way between poses, at parts (k,)."""
+    """Return rotations (k, 3, 3), positions (k, 3) and velocities (k, 6) on ways from poses to one, at parts (k,)."""
     t = t[:, None]
     Q, Q_rate = start.rotation + t * (goal.rotation - start.rotation), goal.rotation - start.rotation
     P, P_rate = start.position + t * (goal.position - start.position), goal.position - start.position
@@ -205,22 +213,24 @@ def _on_way(start: _Pose, goal: _Pose, t: Array) -> tuple[Complex, Complex, Comp
     w, v = Q[:, :1], Q[:, 1:]
     # Twice the vector part of the rate times the conjugate: where its length goes does not count.
     K = _crossing(v)
-    turn = 2 * (Q_rate[1:] * w - Q_rate[0] * v + K @ Q_rate[1:]) / norm
+    turn = 2 * (Q_rate[:, 1:] * w - Q_rate[:, :1] * v + (K @ Q_rate[:, 1:, None])[..., 0]) / norm
     R = np.eye(3) + 2 * (w[..., None] * K + K @ K) / norm[..., None]
     p = P[:, :3] / P[:, 3:]
-    p_rate = (P_rate[:3] - p * P_rate[3]) / P[:, 3:]
+    p_rate = (P_rate[:, :3] - p * P_rate[:, 3:]) / P[:, 3:]
     spin = _crossing(turn)
     return R, p, np.concatenate([p_rate - (spin @ p[..., None])[..., 0], turn], axis=-1)
 
 
 @np.errstate(all="ignore")
 def _followed(chain: _Chain, q: Complex, start: _Pose, goal: _Pose) -> tuple[Complex, NDArray[np.bool_]]:
-    """Follow configurations (k, 6) of one pose to those of another; returns them, and which have arrived.
+    """Follow configurations (k, 6) of one pose, or each of its own, to those of another: these, and which arrive.
 
     Each path takes steps of its own length: a cubic through the last two points and their tangents says where the next
     is, and Newton's method corrects it.
     """
     q = q.copy()
+    shape = (len(q), 4)
+    start = _Pose(np.broadcast_to(start.rotation, shape), np.broadcast_to(start.position, shape))
     t, step = np.zeros(len(q)), np.full(len(q), _FIRST)
     rate = _rates(chain, q, _on_way(start, goal, t)[2])
     before, before_rate, last_step = q - _FIRST * rate, rate.copy(), np.full(len(q), _FIRST)
@@ -232,7 +242,7 @@ def _followed(chain: _Chain, q: Complex, start: _Pose, goal: _Pose) -> tuple[Com
         guess = _extrapolated(
             (before[running], before_rate[running]), (q[running], rate[running]), last_step[running], h
         )
-        R, p, velocity = _on_way(start, goal, t[running] + h)
+        R, p, velocity = _on_way(start.of(running), goal, t[running] + h)
         moved, moved_rate, first, last = _corrected(chain, guess, R, p, velocity)
         good = (first < _RIGHT) & (last < _CORRECTED)
         taken = running[good]

@@ -8,10 +8,11 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions, single_configuration
-from armwright.arrays import Array, ArrayLike, Flags
+from armwright.arrays import Array, ArrayLike, Flags, number
 from armwright.errors import InvalidValueError, UnsupportedArmError, shown
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, exact_pose, pose_errors
@@ -111,7 +112,7 @@ def swivel_intervals(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
     family = _Family(arm, form, X, reference)
     intervals = family.intervals()
     middles = np.array([(one.lower + one.upper) / 2 for one in intervals])
-    rows = family.at(np.array([one.branch for one in intervals], dtype=int), middles[:, None])[:, 0]
+    rows = family.at(np.array([one.branch for one in intervals], dtype=np.intp), middles[:, None])[:, 0]
     return tuple(
         SwivelInterval(label=form.label(one.branch, q), lower=one.lower, upper=one.upper)
         for one, q in zip(intervals, rows, strict=True)
@@ -125,6 +126,24 @@ def swivel_unit(arm: Arm) -> tuple[str, float]:
     return ("mm", 1e-3) if slides else ("deg", math.radians(1.0))
 
 
+def checked_swivel(swivel: float | Choice) -> float | Choice:
+    """Return a swivel, or a word for one, that has been checked.
+
+    Raises:
+        KindError: it is neither a number nor a text.
+        InvalidValueError: it is not finite, or another word.
+    """
+    if isinstance(swivel, str):
+        if swivel not in CHOICES:
+            words = ", ".join(CHOICES)
+            raise InvalidValueError(f"swivel: expected a number or one of {words}, got {shown(swivel)}")
+        return swivel
+    value = number(swivel, "swivel")
+    if not math.isfinite(value):
+        raise InvalidValueError(f"swivel: expected a finite number, got {value}")
+    return value
+
+
 def redundant_candidates(arm: Arm, form: Redundant, X: Array, near: Array, swivel: float | Choice) -> list[Candidate]:
     """Return one configuration of each branch of an arm of seven joints that holds a pose, at a swivel that is chosen.
 
@@ -135,19 +154,10 @@ def redundant_candidates(arm: Arm, form: Redundant, X: Array, near: Array, swive
         near: (7,) where the arm is.
         swivel: a value, or which of the values inside the limits: see ``inverse``. A branch that has none keeps the
             one that ``near`` has, if it exists there.
-
-    Raises:
-        InvalidValueError: ``swivel`` is neither a finite number nor a word for one.
     """
     family = _Family(arm, form, X, near)
     here = float(np.asarray(form.parameter_of(near.tolist())))
-    if isinstance(swivel, str):
-        if swivel not in CHOICES:
-            words = ", ".join(CHOICES)
-            raise InvalidValueError(f"swivel: expected a number or one of {words}, got {shown(swivel)}")
-    elif not math.isfinite(swivel):
-        raise InvalidValueError(f"swivel: expected a finite number, got {shown(swivel)}")
-    values = np.full(len(form.signs), here if isinstance(swivel, str) else float(swivel))
+    values = np.full(len(form.signs), here if isinstance(swivel, str) else swivel)
     if isinstance(swivel, str):
         for branch, value in family.chosen(swivel, here):
             values[branch] = value
@@ -157,10 +167,10 @@ def redundant_candidates(arm: Arm, form: Redundant, X: Array, near: Array, swive
     if not isinstance(swivel, str) and not met.size:
         met = np.array([np.hypot(distances, angles).argmin()])
     candidates = []
-    for branch in met:
+    for branch in met.tolist():
         q = nearest_equivalent(arm, rows[branch], near)
         value = math.remainder(values[branch], _TURN) if isinstance(form, Swivelling) else float(values[branch])
-        candidates.append(Candidate(q, form.label(int(branch), q), swivel=value))
+        candidates.append(Candidate(q, form.label(branch, q), swivel=value))
     return candidates
 
 
@@ -188,7 +198,7 @@ class _Family:
     X: Array
     near: Array
 
-    def at(self, branches: Array, values: Array) -> Array:
+    def at(self, branches: NDArray[np.intp], values: Array) -> Array:
         """Return the configurations (m, k, 7) of branches (m,), each at values (m, k) of the parameter."""
         R, p = self.X[:3, :3].tolist(), self.X[:3, 3].tolist()
         signs: Any = [np.array(side)[:, None] for side in zip(*(self.form.signs[i] for i in branches), strict=True)]
@@ -196,7 +206,7 @@ class _Family:
             return np.empty((*values.shape, self.arm.n))
         return stack(self.form.solve_at(R, p, self.near.tolist(), signs, values).q, values.shape)
 
-    def missing(self, branches: Array, values: Array) -> Array:
+    def missing(self, branches: NDArray[np.intp], values: Array) -> Array:
         """Return how far (m, k) branches (m,) are outside the limits, or from the pose; 0 where neither."""
         q = self.at(branches, values)
         beyond = excess(self.arm, q)
@@ -225,7 +235,7 @@ class _Family:
             images = here + (np.array((-_TURN, 0.0, _TURN)) if isinstance(self.form, Swivelling) else np.zeros(1))
             ends = [np.clip(images, one.lower, one.upper) for one in intervals]
             values = np.array([end[np.abs(end - images).argmin()] for end in ends])
-            rows = self.at(np.array([one.branch for one in intervals], dtype=int), values[:, None])[:, 0]
+            rows = self.at(np.array([one.branch for one in intervals], dtype=np.intp), values[:, None])[:, 0]
             nearest = [nearest_equivalent(self.arm, q, self.near) for q in rows]
             merit = -joint_distances(self.arm, self.near, np.array(nearest).reshape(-1, self.arm.n))
         best: dict[int, int] = {}
@@ -235,7 +245,7 @@ class _Family:
 
     def _farthest(self, intervals: Sequence[_Interval]) -> tuple[Array, Array]:
         """Return the values (m,) at which the joint nearest to a limit has most room, and how much room (m,)."""
-        branches = np.array([one.branch for one in intervals], dtype=int)
+        branches = np.array([one.branch for one in intervals], dtype=np.intp)
         low, high = np.array([(one.lower, one.upper) for one in intervals]).reshape(-1, 2).T
         each, best = np.arange(len(intervals)), low
         room = np.empty(len(intervals))
@@ -247,7 +257,7 @@ class _Family:
             low, high = values[each, np.maximum(k - 1, 0)], values[each, np.minimum(k + 1, _SPREAD - 1)]
         return best, room
 
-    def _room(self, branches: Array, values: Array) -> Array:
+    def _room(self, branches: NDArray[np.intp], values: Array) -> Array:
         """Return the least distance (m, k) of a joint from its limits, in parts of half its range."""
         room = np.full(values.shape, np.inf)
         q = self.at(branches, values)
@@ -353,7 +363,7 @@ class _Family:
             for branch, (x, m) in enumerate(zip(values, missing, strict=True))
             for k in np.flatnonzero(np.diff((m == 0).astype(int))).tolist()
         ]
-        branches = np.array([branch for branch, _, _ in edges], dtype=int)
+        branches = np.array([branch for branch, _, _ in edges], dtype=np.intp)
         good, bad = (np.array([edge[i] for edge in edges], dtype=np.float64) for i in (1, 2))
         each = np.arange(len(edges))
         for _ in range(_CLOSINGS if edges else 0):

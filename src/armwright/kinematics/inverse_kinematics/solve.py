@@ -27,7 +27,7 @@ from armwright.kinematics.inverse_kinematics.every_solution import every_solutio
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.numeric import descend_from, free_joints, numeric_inverse
 from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
-from armwright.kinematics.inverse_kinematics.redundancy import Choice, redundant_candidates
+from armwright.kinematics.inverse_kinematics.redundancy import Choice, checked_swivel, redundant_candidates
 from armwright.kinematics.inverse_kinematics.redundant import Redundant
 from armwright.kinematics.inverse_kinematics.revolutions import mid_range, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits
@@ -105,15 +105,15 @@ def inverse(
     """
     X = exact_pose(X_BT)
     reference = mid_range(known_arm(arm)) if near is None else single_configuration(arm, near, "near")
-    form = find_closed_form(arm)
+    form, chosen = find_closed_form(arm), checked_swivel(swivel)
     if isinstance(form, Redundant):
-        candidates = redundant_candidates(arm, form, X, reference, swivel)
+        candidates = redundant_candidates(arm, form, X, reference, chosen)
         if not candidates:
             return numeric_inverse(arm, X, reference)
         X_near = forward(arm, candidates[0].q)
         met = len(candidates) > 1 or max(pose_errors(arm, candidates[0].q, X)) <= POSE_TOLERANCE
         return rank(arm, X, candidates, reference, apart=_SAME_POLISHED, X_near=None if met else X_near)
-    if swivel != "nearest":
+    if chosen != "nearest":
         raise UnsupportedArmError(
             f"arm '{arm.name}' has no swivel; expected an arm of 7 joints with a closed-form inverse"
         )
