@@ -21,6 +21,7 @@ from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarge
 from armwright.cell.names import arm_name
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
+from armwright.cell.signals_reader import read_inputs
 from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
@@ -96,6 +97,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
+    devices, analogue_devices = _read_devices(top.table("devices")) if "devices" in top else (None, frozenset[str]())
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -113,7 +115,9 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
-        devices=_read_devices(top.table("devices")) if "devices" in top else None,
+        devices=devices,
+        analogue_devices=analogue_devices,
+        inputs=read_inputs(top.table("inputs"), devices),
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
@@ -127,7 +131,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         plan=motion.flag("plan"),
         trials=read_trials(top.table("trials"), parts, markers, frames, standing),
     )
-    top.allow("devices")
+    top.allow("devices", "inputs")
     for table in (camera, motion, contact, top):
         table.refuse_unknown_keys()
     _warn_of_hulls(cell)
@@ -331,10 +335,12 @@ def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list
     return list(path)
 
 
-def _read_devices(table: Table) -> frozenset[str]:
+def _read_devices(table: Table) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of the devices, and of those that can be set to any number."""
     refuse_too_many(table, "entries")
-    devices: set[str] = set()
+    analogue: dict[str, bool] = {}
     for key in table:
-        devices.add(read_name(table, key, devices))
-        table.table(key).refuse_unknown_keys()
-    return frozenset(devices)
+        entry = table.table(key)
+        analogue[read_name(table, key, analogue)] = entry.flag("analogue")
+        entry.refuse_unknown_keys()
+    return frozenset(analogue), frozenset(name for name, is_analogue in analogue.items() if is_analogue)
