@@ -403,7 +403,7 @@ FAULTS = {
     "a device with a setting": (
         ARM + "[devices]\nPRESS = { v = 1 }\n",
         5,
-        "devices, PRESS, v: unknown key; known keys: output, signal",
+        "devices, PRESS, v: unknown key; known keys: analogue, output, signal",
     ),
     "servo out of range": (ARM + "[motion]\nservo_ms = 0.05\n", 5, "motion, servo_ms: expected 0.1 to 100, got 0.05"),
     "no way round": (

@@ -14,6 +14,8 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "CONST": ("CONST", "const"),
     "FUNCTION": ("FUNCTION", "function"),
     "MODE": ("IN", "INOUT", "inout"),
+    "PULSE": ("PULSE", "pulse"),
+    "WITHIN": ("WITHIN", "within"),
     "LOG": ("LOG", "log"),
     "RETURN": ("RETURN", "return"),
 }

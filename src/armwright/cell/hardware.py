@@ -128,6 +128,37 @@ class Hardware(Protocol):
             DeviceError: there is no such device.
         """
 
+    def set_output(self, device: str, value: float) -> None:
+        """Set an analogue device to a number.
+
+        Raises:
+            DeviceError: there is no such device, or it can only be on or off.
+        """
+
+    def pulse(self, device: str, seconds: float) -> None:
+        """Switch a device on for a time [s]; the program goes on meanwhile.
+
+        Raises:
+            DeviceError: there is no such device.
+        """
+
+    def read_output(self, device: str) -> float:
+        """Return what a device is set to: 0 or 1 where it is off or on.
+
+        Raises:
+            DeviceError: there is no such device.
+        """
+
+    def read_input(self, name: str, *, analogue: bool) -> float:
+        """Return an input: 0 or 1, or the number of an analogue one.
+
+        Raises:
+            DeviceError: there is no such input, or it is of the other kind.
+        """
+
+    def note_event(self, event: str) -> None:
+        """Take note that the program signals an event now, on which an input of a simulated cell may depend."""
+
     def part_poses(self) -> PartPoses:
         """Return where the parts are believed to be, and on whose hands. It is not to be changed."""
 
@@ -151,6 +182,13 @@ class SimulatedHardware(Hardware, Protocol):
 
     def copy(self) -> Self:
         """Return devices in the same state; later commands to one do not change the other."""
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input by hand, as a switch in front of the cell does.
+
+        Raises:
+            DeviceError: there is no such input, or a digital one would be neither 0 nor 1.
+        """
 
 
 # How a cell is set up to run programs.

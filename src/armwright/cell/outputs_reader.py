@@ -27,14 +27,17 @@ def read_output(table: Table) -> Output | None:
     return None if number is None and signal is None else Output(number=number, signal=signal)
 
 
-def read_devices(table: Table) -> dict[str, Output | None]:
-    """Read the devices of a cell with the outputs that they are connected to."""
+def read_devices(table: Table) -> tuple[dict[str, Output | None], frozenset[str]]:
+    """Read the devices of a cell: the outputs that they are connected to, and which can be set to any number."""
     refuse_too_many(table, "entries")
     devices: dict[str, Output | None] = {}
+    analogue: set[str] = set()
     for key in table:
-        name = read_name(table, key, devices)
-        devices[name] = read_output(table.table(key))
-    return devices
+        name, entry = read_name(table, key, devices), table.table(key)
+        if entry.flag("analogue"):
+            analogue.add(name)
+        devices[name] = read_output(entry)
+    return devices, frozenset(analogue)
 
 
 def read_controller(table: Table, joints: int) -> Controller:

@@ -22,6 +22,7 @@ from armwright.cell.names import arm_name
 from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
+from armwright.cell.signals_reader import read_inputs
 from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
@@ -97,6 +98,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
+    devices, analogue_devices = read_devices(top.table("devices")) if "devices" in top else (None, frozenset[str]())
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -114,7 +116,9 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
-        devices=read_devices(top.table("devices")) if "devices" in top else None,
+        devices=devices,
+        analogue_devices=analogue_devices,
+        inputs=read_inputs(top.table("inputs"), devices),
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
@@ -128,7 +132,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         plan=motion.flag("plan"),
         trials=read_trials(top.table("trials"), parts, markers, frames, standing),
     )
-    top.allow("devices")
+    top.allow("devices", "inputs")
     for table in (camera, motion, contact, top):
         table.refuse_unknown_keys()
     _warn_of_hulls(cell)

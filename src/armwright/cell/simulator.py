@@ -12,6 +12,7 @@ from armwright.cell.hardware import DeviceError, PeakContact
 from armwright.cell.model import Cell
 from armwright.cell.observations import Observations
 from armwright.cell.part_poses import PartPoses
+from armwright.cell.signals import Signals
 from armwright.errors import closest, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
@@ -82,7 +83,7 @@ class Simulator:
         self._cell, self._scene = cell, scene
         self._courses: dict[str, ContactCourse] = {}
         self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
-        self._active: set[str] = set()
+        self._signals = Signals(cell.inputs)
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
         self._parts = PartPoses(cell)
         # Wrenches that the sensors of forces take for zero.
@@ -92,13 +93,14 @@ class Simulator:
         """Return a simulator in the same state; later commands to one do not change the other."""
         other = Simulator(self._cell, self._scene)
         other._courses = dict(self._courses)
-        other._motions, other._active = dict(self._motions), set(self._active)
+        other._motions, other._signals = dict(self._motions), self._signals.copy()
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
         other._parts, other._zeros = self._parts.copy(), dict(self._zeros)
         return other
 
     def advance(self, now: float) -> None:
         """Let time go by: in this cell nothing goes wrong."""
+        self._signals.now = now
 
     def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm."""
@@ -301,13 +303,80 @@ class Simulator:
         Raises:
             DeviceError: the cell file lists devices, and this is none of them.
         """
+        self._require_device(device)
+        self._signals.write(device, float(on))
+        return 0.0
+
+    def set_output(self, device: str, value: float) -> None:
+        """Set an analogue device to a number.
+
+        Raises:
+            DeviceError: there is no such device, or it can only be on or off.
+        """
+        self._require_device(device)
+        if device not in self._cell.analogue_devices:
+            what = f"device {device} of cell '{self._cell.name}'"
+            raise DeviceError(f"{what} is on or off, and cannot be set to a number")
+        self._signals.write(device, value)
+
+    def pulse(self, device: str, seconds: float) -> None:
+        """Switch a device on for a time [s].
+
+        Raises:
+            DeviceError: there is no such device.
+        """
+        self._require_device(device)
+        self._signals.pulse(device, seconds)
+
+    def read_output(self, device: str) -> float:
+        """Return what a device is set to.
+
+        Raises:
+            DeviceError: there is no such device.
+        """
+        self._require_device(device)
+        return self._signals.output(device)
+
+    def _require_device(self, device: str) -> None:
         devices = self._cell.devices
         if devices is not None and device not in devices:
             near = closest(device, devices)
             hint = f"; did you mean {near}?" if near else ""
             raise DeviceError(f"cell '{self._cell.name}' has no device {device}{hint}")
-        (self._active.add if on else self._active.discard)(device)
-        return 0.0
+
+    def read_input(self, name: str, *, analogue: bool) -> float:
+        """Return an input as it is now.
+
+        Raises:
+            DeviceError: there is no such input, or it is of the other kind.
+        """
+        self._require_input(name)
+        if self._cell.inputs[name].analogue is not analogue:
+            kind, function = ("digital", "INPUT") if analogue else ("analogue", "ANALOG")
+            raise DeviceError(f"input {name} of cell '{self._cell.name}' is {kind}; read it by {function}")
+        return self._signals.input(name)
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input by hand, from now on.
+
+        Raises:
+            DeviceError: there is no such input, or a digital one would be neither 0 nor 1.
+        """
+        self._require_input(name)
+        if not self._cell.inputs[name].analogue and value not in (0.0, 1.0):
+            raise DeviceError(f"input {name} of cell '{self._cell.name}' is digital: expected 0 or 1, got {value:g}")
+        self._signals.set_input(name, value)
+
+    def _require_input(self, name: str) -> None:
+        inputs = self._cell.inputs
+        if name not in inputs:
+            near = closest(name, inputs)
+            hint = f"; did you mean {near}?" if near else ""
+            raise DeviceError(f"cell '{self._cell.name}' has no input {name}{hint}")
+
+    def note_event(self, event: str) -> None:
+        """Take note that the program signals an event now."""
+        self._signals.note_event(event)
 
     def part_poses(self) -> PartPoses:
         """Return where the parts are, and on whose hands. It is not to be changed."""
@@ -355,7 +424,7 @@ class Simulator:
 
     def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""
-        return frozenset(self._active)
+        return self._signals.active()
 
 
 def _split_blocks(values: np.ndarray) -> list[np.ndarray]:

@@ -157,7 +157,9 @@ class PhysicsCell:
             mishap = self._step() or self._watch.look(self._data, self._tick, self._sent)
             if mishap is not None:
                 self._mishaps = (*self._mishaps, mishap)[-_MAX_MISHAPS:]
+                self._believed.advance(self.now)
                 return mishap
+        self._believed.advance(now)
         return None
 
     @property
@@ -264,6 +266,30 @@ class PhysicsCell:
     def operate(self, device: str, *, on: bool) -> float:
         """Switch a device; return the time it takes."""
         return self._believed.operate(device, on=on)
+
+    def set_output(self, device: str, value: float) -> None:
+        """Set an analogue device to a number."""
+        self._believed.set_output(device, value)
+
+    def pulse(self, device: str, seconds: float) -> None:
+        """Switch a device on for a time [s]."""
+        self._believed.pulse(device, seconds)
+
+    def read_output(self, device: str) -> float:
+        """Return what a device is set to."""
+        return self._believed.read_output(device)
+
+    def read_input(self, name: str, *, analogue: bool) -> float:
+        """Return an input as it is now."""
+        return self._believed.read_input(name, analogue=analogue)
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input by hand, from now on."""
+        self._believed.set_input(name, value)
+
+    def note_event(self, event: str) -> None:
+        """Take note that the program signals an event now."""
+        self._believed.note_event(event)
 
     def active_devices(self) -> frozenset[str]:
         """Return the devices that are on."""

@@ -1,5 +1,7 @@
 """Code of control flow: choices, loops, processes, events, locks, recovery, calls."""
 
+import attrs
+
 from armwright.program.bytecode.context import Context, Generators, one_instruction
 from armwright.program.bytecode.emitter import LATER
 from armwright.program.bytecode.instructions import Op
@@ -78,6 +80,24 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     out.patch_jump(over)
 
 
+def wait_until(context: Context, node: tree.WaitUntil) -> None:
+    """Generate a wait for a condition, which stands behind it, ended by RET."""
+    out, limit = context.out, () if node.limit is None else (context.out.value(node.limit),)
+    truth = out.passing()
+    wait = out.emit(Op.UNTIL, LATER, truth, LATER, *limit, span=node.head)
+    over = out.emit(Op.JMP, LATER, span=node.head)
+    condition = out.here
+    out.value(node.condition, truth)
+    out.emit(Op.RET, span=node.head)
+    late = out.here
+    if node.otherwise is None:
+        out.emit(Op.LATE, span=node.head)
+    else:
+        context.generate(node.otherwise)
+    out.instructions[wait] = attrs.evolve(out.instructions[wait], operands=(condition, truth, late, *limit))
+    out.patch_jump(over)
+
+
 def lock(context: Context, node: tree.Lock) -> None:
     """Generate a body between LOCK and UNLK of the same variables."""
     locked = [context.out.value(target) for target in node.targets]
@@ -118,6 +138,7 @@ GENERATORS: Generators = {
     tree.Cobegin: cobegin,
     tree.Signal: one_instruction(Op.SIG),
     tree.Wait: one_instruction(Op.WAIT),
+    tree.WaitUntil: wait_until,
     tree.Pause: one_instruction(Op.PAUSE),
     tree.Lock: lock,
     tree.Try: try_,

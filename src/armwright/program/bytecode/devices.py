@@ -16,6 +16,10 @@ def grasp(context: Context, node: tree.Grasp) -> None:
 
 def operate(context: Context, node: tree.Operate) -> None:
     """Generate one OPERATE."""
+    if node.value is not None:
+        value = context.out.value(node.value)
+        context.out.emit(Op.OPSET, context.out.value(node.device), value, span=node.span)
+        return
     context.out.emit(Op.OPER, context.out.value(node.device), "ON" if node.on else "OFF", span=node.span)
 
 
@@ -29,6 +33,7 @@ GENERATORS: Generators = {
     tree.Open: one_instruction(Op.OPEN),
     tree.Grasp: grasp,
     tree.Operate: operate,
+    tree.Pulse: one_instruction(Op.PULSE),
     tree.ReadVisions: read_visions,
     tree.ReadSystem: one_instruction(Op.READS),
     tree.ZeroForce: one_instruction(Op.ZEROF),

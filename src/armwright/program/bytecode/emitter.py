@@ -8,6 +8,7 @@ from armwright.program.bytecode.instructions import Constant, Instruction, JumpT
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import convert
 from armwright.program.language.words import VALUES
+from armwright.program.semantics.builtins import WITH_DEVICE
 from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import pose_literals, tree
 
@@ -107,9 +108,14 @@ class Emitter:
         return to
 
     def _function(self, node: tree.Function, into: str | None) -> str:
-        operands = [self.value(argument) for argument in node.arguments]
+        is_own = node.name.key in self.scope.symbols.procedures
+        operands: list[Operand]
+        if node.name.key in WITH_DEVICE and not is_own:
+            operands = [name.key for name in node.arguments if isinstance(name, tree.Name)]
+        else:
+            operands = [self.value(argument) for argument in node.arguments]
         to = into or self.passing()
-        if node.name.key in self.scope.symbols.procedures:
+        if is_own:
             return self._operation(Op.CALLF, to, node.name.key, *operands, node=node)
         if node.name.key == "TORQUE":
             # Force and moment are read by one operation.

@@ -86,6 +86,10 @@ class Op(enum.StrEnum):
     MAX = "MAX", "N=NN+"
     TIME = "TIME", "N="  # to: the time on the clock of the cell
     FORCE = "FORCE", "N=a"  # to, axis
+    INPUT = "INPUT", "T=w"  # to, input: whether it is on
+    ANALOG = "ANALOG", "N=w"  # to, input: its number
+    OUTPUT = "OUTPUT", "T=w"  # to, device: whether it is on
+    SETTING = "SETTING", "N=w"  # to, device: what it is set to
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
     AFFIX = "AFFIX", "FF(r)"  # child, parent[, RIGIDLY]: hang on, where both stand now
@@ -95,6 +99,8 @@ class Op(enum.StrEnum):
     OPEN = "OPEN", "w(N)"  # arm[, width]: open the fingers
     GRASP = "GRASP", "(w)"  # [arm]: close the fingers; without an arm, of the one named or moved last
     OPER = "OPER", "wo"  # device, ON or OFF
+    OPSET = "OPSET", "wN"  # device, number
+    PULSE = "PULSE", "wN"  # device, seconds
     READV = "READV", "F"  # frame: ask the vision system
     READS = "READS", "w"  # arm: read the joint sensors
     ZEROF = "ZEROF", "w"  # arm: its present force and moment count as zero
@@ -125,6 +131,8 @@ class Op(enum.StrEnum):
     QUIT = "QUIT", ""  # end of a process
     SIG = "SIG", "E"  # event
     WAIT = "WAIT", "E"  # event
+    UNTIL = "UNTIL", "jnj(N)"  # condition, truth value, place when it is too late[, seconds]: look at every tick
+    LATE = "LATE", ""  # a WAIT UNTIL has lasted too long
     PAUSE = "PAUSE", "N"  # seconds
     LOCK = "LOCK", "n+"  # variables or elements
     UNLK = "UNLK", "n+"  # the same

@@ -221,6 +221,14 @@ def _multiply(verifier: Verifier, state: State) -> Flow:
     return Flow(verifier.write(state, to, left))
 
 
+def _until(verifier: Verifier, state: State) -> Flow:
+    (condition, late), truth = verifier.targets, verifier.operands[1]
+    if not str(truth).startswith("%"):
+        raise verifier.wrong(f"UNTIL expects a temporary such as %1 for the value of its condition, got {truth}")
+    verifier.begin(condition, Routine.CONDITION, state, str(truth))
+    return Flow(state, (late, state))
+
+
 def _compare(verifier: Verifier, state: State) -> Flow:
     """EQ and NE compare numbers, or texts."""
     left, right = (verifier.value(state, operand) for operand in verifier.operands[1:])
@@ -367,6 +375,7 @@ _RULES: Mapping[Op, Rule] = {
     **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
+    Op.UNTIL: _until,
     Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,

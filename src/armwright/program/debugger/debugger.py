@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.cell.hardware import HardwareFactory
+from armwright.cell.hardware import DeviceError, HardwareFactory, SimulatedHardware
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
 from armwright.physics.kinematic_cell import kinematic_cell
@@ -350,6 +350,27 @@ class Debugger:
         except RunError as error:
             raise ExpressionError(str(error)) from None
         return variables.make_variable(self.view, slot)
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input of the cell by hand, from now on; a run that is gone back in remembers it.
+
+        Args:
+            name: of the input, in any case.
+            value: 0 or 1, or the number of an analogue input.
+
+        Raises:
+            DebuggerError: the run does not stand still, the cell has no such input, or it cannot be set so.
+        """
+        self._require_stopped()
+
+        def change(machine: Machine) -> None:
+            assert isinstance(machine.hardware, SimulatedHardware)  # noqa: S101 - the debugger runs no others
+            machine.hardware.set_input(name.upper(), value)
+
+        try:
+            self.execution.timeline.apply_change(change)
+        except DeviceError as error:
+            raise DebuggerError(str(error)) from None
 
     def _frame(self, path: ProcessPath, level: int) -> StackFrame:
         frames = self.stack(path)

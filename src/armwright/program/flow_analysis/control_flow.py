@@ -204,6 +204,21 @@ def end(context: Context, node: tree.Halt | tree.Retry) -> None:
     context.state.ended, context.state.end_span = True, node.span if is_valid else None
 
 
+def wait_until(context: Context, node: tree.WaitUntil) -> None:
+    """Analyse what may run where a condition does not hold in time."""
+    state = context.state
+    require_value(state, node.limit, node.condition)
+    if node.otherwise is None:
+        return
+    if state.is_first_pass:
+        state.forget(context.side_effects(node))
+        return
+    message, advice = "it gets a value only where this WAIT ends too late", "give it a value before the WAIT"
+    with state.conditional():
+        outcomes = (context.path(node.otherwise), context.path())
+    context.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
+
+
 def return_(context: Context, node: tree.Return) -> None:
     """End the path of a FUNCTION with its value."""
     require_value(context.state, node.value)
@@ -219,6 +234,7 @@ STEPS: Steps = {
     tree.Cobegin: cobegin,
     tree.Signal: lambda context, node: require_indices(context.state, node.event),
     tree.Wait: lambda context, node: require_indices(context.state, node.event),
+    tree.WaitUntil: wait_until,
     tree.Pause: lambda context, node: require_value(context.state, node.duration),
     tree.Lock: lock,
     tree.Try: try_,

@@ -1,11 +1,12 @@
 """Definite assignment: variables without a value where one is needed, on all paths or on some."""
 
+from armwright.errors import closest
 from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.state import FlowState
-from armwright.program.language.diagnostic import labels
+from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
-from armwright.program.semantics.builtins import WITH_AXIS
+from armwright.program.semantics.builtins import WITH_DEVICE, WITH_INPUT, WITH_NAME
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
@@ -29,11 +30,34 @@ def require_value(state: FlowState, *nodes: tree.Expression | None) -> None:
             require_value(state, *node.indices)
             _require_variable(state, node)
         elif isinstance(node, tree.Function):
-            waiting += reversed(node.arguments if node.name.key not in WITH_AXIS else ())
+            if node.name.key in WITH_DEVICE and node.name.key not in state.symbols.procedures:
+                _check_signal(state, node)
+            waiting += reversed(node.arguments if node.name.key not in WITH_NAME else ())
         elif isinstance(node, tree.ArmName):
             state.check_arm(node.key, node.span)
         elif isinstance(node, tree.Unary):
             waiting.append(node.operand)
+
+
+def _check_signal(state: FlowState, node: tree.Function) -> None:
+    """Report an input or a device that the cell does not have, or that is of another kind than the function reads."""
+    function, name, cell = node.name.key, node.arguments[0] if node.arguments else None, state.cell
+    if cell is None or not isinstance(name, tree.Name):
+        return
+    what = "input" if function in WITH_INPUT else "device"
+    known = cell.inputs if function in WITH_INPUT else cell.devices
+    if known is None:
+        return
+    if name.key not in known:
+        listed = ", ".join(sorted(known)) or "none"
+        text, note = f"the cell has no {what} `{name.text}`", f"{what}s of the cell: {listed}"
+        code = "R608" if function in WITH_INPUT else "R602"
+        advice = did_you_mean(closest(name.text, known))
+        state.report(code, text, name.span, f"no such {what}", note=note, advice=advice)
+    elif function in WITH_INPUT and (name.key in cell.analogue) is not (function == "ANALOG"):
+        kind, other = ("analogue", "ANALOG") if function == "INPUT" else ("digital", "INPUT")
+        text = f"input `{name.text}` of the cell is {kind}"
+        state.report("R608", text, name.span, kind, advice=f"read it by `{other}({name.text})`")
 
 
 def require_indices(state: FlowState, *nodes: object) -> None:

@@ -98,11 +98,17 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
         set_pose(state, frame, target, node.span)
 
 
-def operate(state: FlowState, node: tree.Operate) -> None:
-    """Switch a device on or off."""
+def operate(state: FlowState, node: tree.Operate | tree.Pulse) -> None:
+    """Switch a device on or off, or set it to a number."""
+    value = node.value if isinstance(node, tree.Operate) else node.duration
+    require_value(state, value)
     device, devices = node.device, state.cell.devices if state.cell else None
     known = {name.upper() for name in devices or ()}
-    if isinstance(device, tree.Name) and devices is not None and device.key not in known:
+    is_number = isinstance(node, tree.Operate) and value is not None
+    if isinstance(device, tree.Name) and state.cell and device.key in known - state.cell.analogue and is_number:
+        text, advice = f"device `{device.text}` is on or off, and cannot be set to a number", "write ON or OFF"
+        state.report("R602", text, device.span, "not analogue", advice=advice)
+    elif isinstance(device, tree.Name) and devices is not None and device.key not in known:
         listed = ", ".join(sorted(known)) or "none"
         text, note = f"the cell has no device `{device.text}`", f"devices of the cell: {listed}"
         advice = did_you_mean(closest(device.text, known))
@@ -113,6 +119,7 @@ STEPS: Steps = {
     tree.Open: of_state(open_),
     tree.Grasp: of_state(grasp),
     tree.Operate: of_state(operate),
+    tree.Pulse: of_state(operate),
     tree.ReadVisions: of_state(read_visions),
     tree.ReadSystem: of_state(read_system),
     tree.ZeroForce: of_state(zero_force),

@@ -13,7 +13,18 @@ INDENT, CONTINUATION, CLAUSE = 2, 4, 5
 _DECLARATION = 4
 
 # Statements that take rows of their own, and so cannot stand within a row.
-_LARGE = (tree.Block, tree.If, tree.While, tree.For, tree.Repeat, tree.Cobegin, tree.Try, tree.Lock, tree.Move)
+_LARGE = (
+    tree.Block,
+    tree.If,
+    tree.While,
+    tree.For,
+    tree.Repeat,
+    tree.Cobegin,
+    tree.Try,
+    tree.Lock,
+    tree.Move,
+    tree.WaitUntil,
+)
 _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
 
 
@@ -142,9 +153,11 @@ class _Layout:
 
     def _statement(self, node: tree.Statement, column: int) -> None:
         self._row(node.span.start, column, continuation=CLAUSE if isinstance(node, tree.Move) else CONTINUATION)
+        if isinstance(node, tree.Move):
+            self._move(node, column)
+        elif isinstance(node, tree.WaitUntil):
+            self._wait(node, column)
         match node:
-            case tree.Move():
-                self._move(node, column)
             case tree.If():
                 self._if(node, column)
             case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body):
@@ -167,6 +180,11 @@ class _Layout:
     def _nested(self, node: tree.Statement, column: int) -> None:
         """Lay out the statement behind THEN, ELSE or DO."""
         self._statement(node, column if isinstance(node, tree.Block) else column + INDENT)
+
+    def _wait(self, node: tree.WaitUntil, column: int) -> None:
+        if node.otherwise is not None:
+            self._row(self._before(node.otherwise.span.start).start, column, comment_indent=INDENT)
+            self._nested(node.otherwise, column)
 
     def _block(self, node: tree.Block, column: int) -> None:
         self._statements(node.statements, column + INDENT)

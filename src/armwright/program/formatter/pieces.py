@@ -8,7 +8,7 @@ import attrs
 
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_DEVICE
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
 
@@ -154,7 +154,7 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
             is_axis = before == "(" and earlier in WITH_AXIS and key in AXES and follows == ")"
             if in_units or is_axis or statement_phrase(before, key, follows) or (before == "READ" and key in SENSORS):
                 yield key
-            elif before == "OPERATE":
+            elif before in ("OPERATE", "PULSE") or (before == "(" and earlier in WITH_DEVICE and follows == ")"):
                 yield token.text
             else:
                 yield names.spelling(token, follows)

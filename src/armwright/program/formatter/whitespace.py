@@ -16,7 +16,9 @@ _BRACKETS = _OPENING | _CLOSING
 # What lists in parentheses stand behind, beside names.
 _LIST_WORDS = frozenset(("PRINT", "VIA", "LOCK", "LOG"))
 # Before these words a line may end, before operations too, but rather not.
-_PARTS = frozenset(("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "ON", "RIGIDLY", "NONRIGIDLY"))
+_PARTS = frozenset(
+    ("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "ON", "RIGIDLY", "NONRIGIDLY", "WITHIN")
+)
 _OPERATOR_PENALTIES = {
     **dict.fromkeys(("AND", "OR"), 1),
     **dict.fromkeys(("<", "<=", "<>", ">=", ">"), 3),

@@ -67,10 +67,20 @@ TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
 HEADERS_IN_CONTEXT = ("CONST", "FUNCTION")
 # How a parameter is passed, in front of its name.
 PARAMETER_MODES = ("IN", "INOUT")
+# What starts a statement only in front of a name.
+STATEMENTS_BEFORE_NAME = ("PULSE",)
 # What starts a statement only in front of a text.
 STATEMENTS_BEFORE_TEXT = ("LOG",)
 WORDS_IN_CONTEXT = frozenset(
-    (*TYPES_IN_CONTEXT, *HEADERS_IN_CONTEXT, *PARAMETER_MODES, *STATEMENTS_BEFORE_TEXT, "RETURN")
+    (
+        *TYPES_IN_CONTEXT,
+        *HEADERS_IN_CONTEXT,
+        *PARAMETER_MODES,
+        *STATEMENTS_BEFORE_NAME,
+        *STATEMENTS_BEFORE_TEXT,
+        "RETURN",
+        "WITHIN",
+    )
 )
 
 # What other languages call a statement, and what they have and RLO has not.

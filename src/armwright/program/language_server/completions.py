@@ -15,6 +15,7 @@ from armwright.program.language.words import (
     BLOCK_CLOSERS,
     SENSORS,
     STATEMENT_PHRASES,
+    STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     VALUES,
     VOCABULARIES,
@@ -27,7 +28,7 @@ from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS, WITH_INPUT
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -63,6 +64,7 @@ _WORD_SNIPPETS = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
     "FORCE": "FORCE ${1:ARM_1}",
+    "PULSE": "PULSE ${1:device} FOR ${2:0.5s}",
     "LOG": 'LOG "${1:name}" (${2:value})',
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
@@ -88,6 +90,7 @@ class _OperandRule:
         kinds: of variables; an array of elements of the kind may stand there too.
         arms: whether an arm may.
         devices: whether a device may.
+        inputs: whether an input may.
         functions: which functions of the language may.
         values: which values of the language may.
         words: other words with a meaning at this position.
@@ -96,6 +99,7 @@ class _OperandRule:
     kinds: frozenset[VariableKind] = frozenset()
     arms: bool = False
     devices: bool = False
+    inputs: bool = False
     functions: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
@@ -113,7 +117,8 @@ _ANY_VALUE = _OperandRule(
 )
 _NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
 _CONDITION = _OperandRule(kinds=frozenset((VariableKind.SCALAR, VariableKind.BOOLEAN)), functions=_NUMBERS)
-_CONDITION = attrs.evolve(_CONDITION, values=("PI", "TIME", *_TRUTHS), words=("NOT",))
+_TESTS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.CONDITION)
+_CONDITION = attrs.evolve(_CONDITION, functions=(*_NUMBERS, *_TESTS), values=("PI", "TIME", *_TRUTHS), words=("NOT",))
 _TEXT = _OperandRule(kinds=frozenset((VariableKind.TEXT,)), functions=("TEXT",))
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
 _TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
@@ -147,6 +152,8 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     **dict.fromkeys(WITH_AXIS, _OperandRule(words=AXES)),
     "TEXT": _ANY_VALUE,
+    **dict.fromkeys(WITH_INPUT, _OperandRule(inputs=True)),
+    **dict.fromkeys(("OUTPUT", "SETTING"), _OperandRule(devices=True)),
     "DIST": _POSE,
     **dict.fromkeys(("INV", *MEASURES), _STEP),
     **{
@@ -241,7 +248,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
             yield word
     if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
         yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
-        yield from STATEMENTS_BEFORE_TEXT
+        yield from (*STATEMENTS_BEFORE_TEXT, *STATEMENTS_BEFORE_NAME)
 
 
 class _ItemFactory:
@@ -318,6 +325,9 @@ class _ItemFactory:
 
     def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the devices of the cell."""
+        if operand.inputs and self._analysis.cell is not None:
+            for name in sorted(self._analysis.cell.inputs):
+                yield self._item(self._match_case(name), Kind.Property, "", "input")
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
                 yield self._item(self._match_case(name), Kind.Property, "", "device")

@@ -69,7 +69,11 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     # tools and sensors
     "OPEN": ("OPEN arm [TO width]", "Opens the fingers of an arm."),
     "GRASP": ("GRASP [arm]", "Closes the fingers; without an arm, those of the arm that was named or moved last."),
-    "OPERATE": ("OPERATE device [ON | OFF]", "Switches a device on or off; all are off when the program ends."),
+    "OPERATE": (
+        "OPERATE device [ON | OFF] | OPERATE device TO number",
+        "Switches a device on or off, or sets an analogue one; all are off when the program ends.",
+    ),
+    "PULSE": ("PULSE device FOR seconds", "Switches a device on for this time, while the program goes on."),
     "OFF": ("OPERATE device OFF", "Switches a device off."),
     "READ": (
         "READ VISIONS (frames) | READ SYSTEM (arm)",
@@ -120,7 +124,14 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "COEND": (_COBEGIN, "Closes COBEGIN."),
     "PRIORITY": (_COBEGIN, "Of branches that run at the same time, the one with the larger number is served first."),
     "SIGNAL": ("SIGNAL event", "Adds one to an event."),
-    "WAIT": ("WAIT event", "Waits until an event has been signalled, and takes one from it."),
+    "WAIT": (
+        "WAIT event | WAIT UNTIL condition [WITHIN seconds [ELSE statement]]",
+        "Waits until an event has been signalled, and takes one from it; or until a condition holds.",
+    ),
+    "WITHIN": (
+        "WAIT UNTIL condition WITHIN seconds [ELSE statement]",
+        "The longest time of the wait; when it is over the statement runs, and without one it is an error.",
+    ),
     "LOCK": ("LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."),
     # recovery
     "TRY": (_TRY, "Runs statements; when one of them fails, those after RECOVER run instead of the rest."),
@@ -163,6 +174,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "FALSE": ("FALSE", "The condition that does not hold."),
     "TIME": ("TIME", "The time on the clock of the cell since the program began, in seconds."),
     # sensors
+    "INPUT": ("INPUT (name)", "A condition: whether a digital input of the cell is on."),
+    "ANALOG": ("ANALOG (name)", "The number of an analogue input of the cell."),
+    "OUTPUT": ("OUTPUT (device)", "A condition: whether a device is on."),
+    "SETTING": ("SETTING (device)", "The number that a device is set to; 1 where it is on, 0 where it is off."),
     "FORCE": ("FORCE (X | Y | Z)", "The force on the gripper of the moving arm along an axis of the world, in N."),
     "TORQUE": (
         "TORQUE (X | Y | Z)",

@@ -75,8 +75,9 @@ def folding_ranges(analysis: Analysis) -> list[FoldingRange]:
 
 def _block_lines(analysis: Analysis) -> Iterator[_Lines]:
     line_of, opened = analysis.codec.line_of, []
-    for token in analysis.compiled.tokens:
-        if token.kind is not TokenKind.KEYWORD:
+    for before, token in pairwise(analysis.compiled.tokens):
+        # The UNTIL of a WAIT closes nothing.
+        if token.kind is not TokenKind.KEYWORD or (before.key, token.key) == ("WAIT", "UNTIL"):
             continue
         if token.key in _OPENING:
             opened.append(token)

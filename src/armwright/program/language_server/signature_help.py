@@ -9,7 +9,7 @@ from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, lexical_context
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import word_doc
-from armwright.program.semantics.builtins import FUNCTIONS, MEASURES, WITH_AXIS
+from armwright.program.semantics.builtins import FUNCTIONS, MEASURES, WITH_AXIS, WITH_INPUT
 from armwright.program.syntax.lexer import Token, TokenKind
 
 _PARAMETERS = {
@@ -18,6 +18,8 @@ _PARAMETERS = {
     "INV": ("step",),
     "DIST": ("frame", "frame"),
     "TEXT": ("value",),
+    **dict.fromkeys(WITH_INPUT, ("input",)),
+    **dict.fromkeys(("OUTPUT", "SETTING"), ("device",)),
     "RPY": ("roll", "pitch", "yaw"),
     "ROT": ("x", "y", "z", "angle"),
     **dict.fromkeys(MEASURES, ("pose",)),

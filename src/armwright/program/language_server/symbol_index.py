@@ -9,7 +9,7 @@ import attrs
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_DEVICE
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -122,6 +122,8 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
                 name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
             elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key in WITH_AXIS:
                 name.kind, name.owner, name.type = NameKind.AXIS, None, None
+            elif previous == "(" and index > 1 and tokens[index - 2].key in WITH_DEVICE and next_key == ")":
+                name.kind, name.owner, name.type = NameKind.DEVICE, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
@@ -143,7 +145,7 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
     phrase = statement_phrase(previous, key, next_key)
     if phrase or (previous == "READ" and key in SENSORS):
         return Occurrence(start, end, phrase or key, NameKind.SENSOR)
-    if previous == "OPERATE":
+    if previous in ("OPERATE", "PULSE"):
         return Occurrence(start, end, key, NameKind.DEVICE)
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)

@@ -6,7 +6,7 @@ characters, so that every span is one in the text of the session.
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import takewhile
+from itertools import pairwise, takewhile
 
 import attrs
 
@@ -136,7 +136,9 @@ def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> 
 def _block_depth(tokens: Sequence[Token]) -> int:
     """Return how many blocks are open after some tokens."""
     words = [token.key for token in tokens if token.kind is TokenKind.KEYWORD]
-    return sum((word in BLOCK_OPENERS) - (word in BLOCK_CLOSERS) for word in words)
+    # The UNTIL of a WAIT closes nothing.
+    waits = sum(pair == ("WAIT", "UNTIL") for pair in pairwise(words))
+    return waits + sum((word in BLOCK_OPENERS) - (word in BLOCK_CLOSERS) for word in words)
 
 
 def _strip_program_frame(tokens: Sequence[Token]) -> list[Token]:
@@ -307,7 +309,7 @@ def _split_statements(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
     """Split a sequence of statements after each ``;`` that is not inside one of them."""
     first, depth = 0, 0
     for index, token in enumerate(part):
-        depth += _block_depth((token,))
+        depth += _block_depth(part[max(0, index - 1) : index + 1]) - _block_depth(part[max(0, index - 1) : index])
         if token.key == ";" and depth <= 0:
             yield part[first : index + 1]
             first = index + 1

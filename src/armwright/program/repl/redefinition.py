@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.semantics.builtins import WITH_AXIS
+from armwright.program.semantics.builtins import WITH_NAME
 from armwright.program.syntax import tree
 
 
@@ -148,7 +148,7 @@ def _map_names(node: Any, change: Callable[[tree.Name], tree.Name]) -> Any:
         case tree.Name():
             changed = change(node)
         case tree.Function(name=name, arguments=arguments):
-            if name.key not in WITH_AXIS:
+            if name.key not in WITH_NAME:
                 changed = attrs.evolve(node, arguments=_map_names(arguments, change))
         case tree.Procedure(name=name, body=body):
             local = local_names(node)

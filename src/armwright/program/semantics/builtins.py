@@ -14,6 +14,11 @@ from armwright.program.syntax import tree
 AXES = ("X", "Y", "Z")
 # Functions whose argument is an axis, not a variable.
 WITH_AXIS = ("FORCE", "TORQUE")
+# Functions whose argument is an input or a device of the cell.
+WITH_INPUT = ("INPUT", "ANALOG")
+WITH_DEVICE = (*WITH_INPUT, "OUTPUT", "SETTING")
+# Functions whose argument is a name that is no variable.
+WITH_NAME = (*WITH_AXIS, *WITH_DEVICE)
 # Procedures of programs may not have the names of these: all other functions came later than such programs.
 FIRST_FUNCTIONS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV", "DIST", "FORCE")
 
@@ -54,6 +59,8 @@ FUNCTIONS: Mapping[str, Signature] = {
     "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
     "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
     **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),
+    **dict.fromkeys(("INPUT", "OUTPUT"), Signature("one name of the cell", 1, frozenset(), ExpressionType.CONDITION)),
+    **dict.fromkeys(("ANALOG", "SETTING"), Signature("one name of the cell", 1, frozenset(), _NUMBER)),
     "RPY": Signature("three angles", 3, _SCALARS, _TRANS, "angle"),
     "ROT": Signature("the three components of an axis and an angle", 4, _SCALARS, _TRANS, "angle"),
     **dict.fromkeys(MEASURES, Signature("one FRAME or TRANS", 1, _POSES, _NUMBER)),
@@ -82,8 +89,8 @@ def result_type(
         count = counted(given, "argument")
         names.report("E220", f"{required}, not {count}", node.span, f"{count} here")
         return signature.result if key != "INV" else None
-    if key in WITH_AXIS:
-        _check_axis(names, key, node.arguments[0])
+    if key in WITH_NAME:
+        (_check_axis if key in WITH_AXIS else _check_device)(names, key, node.arguments[0])
         return signature.result
     for argument, argument_type in zip(node.arguments, argument_types, strict=True):
         if argument_type is ExpressionType.EVENT:
@@ -96,6 +103,15 @@ def result_type(
         return signature.result
     inverted = argument_types[0]
     return _INVERSES.get(inverted, inverted) if inverted in signature.argument_types else None
+
+
+def _check_device(names: NameResolver, function: str, node: tree.Expression) -> None:
+    if isinstance(node, tree.Poison | tree.Name):
+        return
+    names.mark_used(variable_keys(node))
+    what = "input" if function in WITH_INPUT else "device"
+    text = f"{function} takes the name of an {what} of the cell, not {quote_expression(node)}".replace("an d", "a d")
+    names.report("E220", text, node.span, f"no {what}")
 
 
 def _check_axis(names: NameResolver, function: str, node: tree.Expression) -> None:

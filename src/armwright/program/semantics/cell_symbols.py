@@ -19,6 +19,8 @@ class KnownCell:
         arms: such as ``ARM_1``.
         frames: that have a value from the start, each with its parent.
         devices: that can be operated; None when any will do.
+        analogue: the devices and inputs that are numbers, and not only on or off.
+        inputs: that can be read; None when nothing is known of them.
         visions: frames that the camera has an answer for; None when nothing is known of the camera.
         reach: of the arm that reaches farthest [m]; None when that is not known.
     """
@@ -26,6 +28,8 @@ class KnownCell:
     arms: frozenset[str]
     frames: Mapping[str, str] = attrs.field(factory=dict)
     devices: frozenset[str] | None = None
+    analogue: frozenset[str] = frozenset()
+    inputs: frozenset[str] | None = None
     visions: frozenset[str] | None = None
     reach: float | None = None
 
@@ -53,6 +57,8 @@ def known_cell(cell: Cell) -> KnownCell:
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=None if cell.devices is None else frozenset(cell.devices),
+        analogue=cell.analogue_devices | {name for name, source in cell.inputs.items() if source.analogue},
+        inputs=frozenset(cell.inputs),
         visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
     )

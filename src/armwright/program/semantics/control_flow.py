@@ -78,6 +78,15 @@ def event(context: Context, node: tree.Signal | tree.Wait) -> None:
     require_type(context.names, node.event, ExpressionType.EVENT, "E223", what, advice=lambda _: advice)
 
 
+def wait_until(context: Context, node: tree.WaitUntil) -> None:
+    """Check condition, time and statement of a WAIT UNTIL."""
+    require_condition(context.names, node.condition, "WAIT UNTIL")
+    if node.limit is not None and require_quantity(context.names, node.limit, "time", "WITHIN needs a time"):
+        check_range(context.names, node.limit, "a time", zero=True)
+    if node.otherwise is not None:
+        context.check(node.otherwise)
+
+
 def pause(context: Context, node: tree.Pause) -> None:
     """Check the time of a PAUSE."""
     if require_quantity(context.names, node.duration, "time", "PAUSE needs a time"):
@@ -131,6 +140,7 @@ CHECKS: Checks = {
     tree.Cobegin: cobegin,
     tree.Signal: event,
     tree.Wait: event,
+    tree.WaitUntil: wait_until,
     tree.Pause: pause,
     tree.Lock: lock,
     tree.Try: try_,

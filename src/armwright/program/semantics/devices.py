@@ -32,11 +32,23 @@ def open_(context: Context, node: tree.Open) -> None:
 
 def operate(context: Context, node: tree.Operate) -> None:
     """Check that OPERATE names a device; devices are not declared."""
-    names, device = context.names, node.device
+    _device(context.names, node.device, "OPERATE starts a device")
+    if node.value is not None:
+        require_type(context.names, node.value, ExpressionType.SCALAR, "E216", "OPERATE ... TO needs a number")
+
+
+def pulse(context: Context, node: tree.Pulse) -> None:
+    """Check device and time of a PULSE."""
+    _device(context.names, node.device, "PULSE switches a device")
+    if require_quantity(context.names, node.duration, "time", "PULSE ... FOR needs a time"):
+        check_range(context.names, node.duration, "a pulse", zero=False)
+
+
+def _device(names: NameResolver, device: tree.Mobile, what: str) -> None:
     if isinstance(device, tree.ArmName):
-        names.report("E201", f"OPERATE starts a device, but `{device.text}` is an arm", device.span, "an arm")
+        names.report("E201", f"{what}, but `{device.text}` is an arm", device.span, "an arm")
     elif isinstance(device, tree.Index):
-        text = f"OPERATE starts a device, but {quote_expression(device)} is an element of an array"
+        text = f"{what}, but {quote_expression(device)} is an element of an array"
         names.report("E201", text, device.span, "no device")
 
 
@@ -82,6 +94,7 @@ CHECKS: Checks = {
     tree.Open: open_,
     tree.Grasp: lambda context, node: _arm(context.names, node.arm, "GRASP"),
     tree.Operate: operate,
+    tree.Pulse: pulse,
     tree.ReadVisions: read_visions,
     tree.ReadSystem: lambda context, node: _arm(context.names, node.arm, "READ SYSTEM"),
     tree.ZeroForce: lambda context, node: _arm(context.names, node.arm, "ZERO FORCE"),

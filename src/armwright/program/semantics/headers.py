@@ -7,7 +7,7 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
-from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_NAME
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
 from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
 from armwright.program.semantics.scopes import NameResolver
@@ -123,7 +123,7 @@ def _declare_constant(names: NameResolver, node: tree.Constant) -> None:
 def _constant_type(names: NameResolver, node: tree.Constant) -> VariableType | None:
     """Return what a constant holds; None where something is wrong with its value."""
     for part in tree.walk(node.value):
-        varies = isinstance(part, tree.ArmName) or (isinstance(part, tree.Function) and part.name.key in WITH_AXIS)
+        varies = isinstance(part, tree.ArmName) or (isinstance(part, tree.Function) and part.name.key in WITH_NAME)
         if isinstance(part, tree.Name) and names.scope.type(part.key) is not None:
             varies = not names.scope.is_constant(part.key)
         if varies or (isinstance(part, tree.Name) and part.key == "TIME" and names.scope.is_value(part.key)):

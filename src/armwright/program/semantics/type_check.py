@@ -11,7 +11,7 @@ from armwright.program.language.kinds import VariableType
 from armwright.program.language.units import Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics import array_elements, builtins, operators
-from armwright.program.semantics.builtins import FUNCTIONS, WITH_AXIS
+from armwright.program.semantics.builtins import FUNCTIONS, WITH_NAME
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import (
     ACCEPTED_TYPES,
@@ -221,7 +221,7 @@ def _function(names: NameResolver, node: tree.Function) -> ExpressionType | None
     key, arguments = node.name.key, node.arguments
     if key in FUNCTIONS and key not in names.symbols.procedures:
         # An axis has a name but is no variable.
-        is_axis = [key in WITH_AXIS and isinstance(argument, tree.Name) for argument in arguments]
+        is_axis = [key in WITH_NAME and isinstance(argument, tree.Name) for argument in arguments]
         types = [None if axis else infer_type(names, node) for axis, node in zip(is_axis, arguments, strict=True)]
         return builtins.result_type(names, node, types)
     procedure = names.resolve_call(key)

@@ -2,6 +2,7 @@
 
 from armwright.errors import closest
 from armwright.program.language.source import Span
+from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import (
     expression,
@@ -369,15 +370,28 @@ def signal(tokens: TokenStream) -> tree.Signal:
     return tokens.node(tree.Signal, tokens.take(), variable(tokens, _EVENT, "after SIGNAL"))
 
 
-# "WAIT" lvalue
-def wait(tokens: TokenStream) -> tree.Wait:
+# "WAIT" lvalue | "WAIT" "UNTIL" expr [ "WITHIN" expr [ "ELSE" statement ] ]
+def wait(tokens: TokenStream) -> tree.Wait | tree.WaitUntil:
     """Read one WAIT."""
     start = tokens.take()
+    if tokens.standard is Standard.RLO_2 and tokens.accept("UNTIL"):
+        return _wait_until(tokens, start)
     if tokens.current.kind is TokenKind.NUMBER:
         text = tokens.current.text
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
         tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
     return tokens.node(tree.Wait, start, variable(tokens, _EVENT, "after WAIT"))
+
+
+def _wait_until(tokens: TokenStream, start: Token) -> tree.WaitUntil:
+    condition = head_expression(tokens, _CONDITION, "after UNTIL", "WITHIN")
+    limit = otherwise = None
+    if tokens.accept_word("WITHIN"):
+        limit = head_expression(tokens, "a number of seconds", "after WITHIN", "ELSE")
+    head = tokens.span_since(start)
+    if limit is not None and _accept_else(tokens):
+        otherwise = nested_statement(tokens, "ELSE")
+    return tokens.node(tree.WaitUntil, start, head, condition, limit, otherwise)
 
 
 # "PAUSE" expr

@@ -42,15 +42,27 @@ def _starts_other_statement(tokens: TokenStream) -> bool:
     return closest(tokens.current.text, ("ELSE", *tokens.open_closers[-1])) is not None
 
 
-# operate = "OPERATE" name [ "ON" | "OFF" ] ;
+# operate = "OPERATE" name [ "ON" | "OFF" | "TO" expr ] ;
 def operate(tokens: TokenStream) -> tree.Operate:
     """Read one OPERATE."""
     start = tokens.take()
     device = mobile(tokens, "the name of a device", "after OPERATE")
     if isinstance(device, tree.Name):
         tokens.check_name_length(device)
+    if tokens.accept("TO"):
+        return tokens.node(tree.Operate, start, device, True, expression(tokens, "a number", "after TO"))
     word = tokens.accept("ON", "OFF")
     return tokens.node(tree.Operate, start, device, word is None or word.key == "ON")
+
+
+# pulse = "PULSE" name "FOR" expr ;
+def pulse(tokens: TokenStream) -> tree.Pulse:
+    """Read one PULSE."""
+    start = tokens.current
+    tokens.accept_word("PULSE")
+    device = mobile(tokens, "the name of a device", "after PULSE")
+    tokens.expect("FOR", "after the device")
+    return tokens.node(tree.Pulse, start, device, expression(tokens, "a number of seconds", "after FOR"))
 
 
 # read = "READ" "VISIONS" "(" lvalue { "," lvalue } ")" | "READ" "SYSTEM" "(" arm ")" ;

@@ -26,6 +26,7 @@ _RULES: Mapping[str, Rule] = {
     "OPEN": devices.open_,
     "GRASP": devices.grasp,
     "OPERATE": devices.operate,
+    "PULSE": devices.pulse,
     "READ": devices.read,
     "ZERO": devices.zero_force,
     "MOVE": move,

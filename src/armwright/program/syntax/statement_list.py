@@ -11,6 +11,7 @@ from armwright.program.language.words import (
     BLOCK_OPENERS,
     FOREIGN_STATEMENTS,
     STATEMENT_PHRASES,
+    STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     UNSUPPORTED_STATEMENTS,
     Standard,
@@ -300,6 +301,8 @@ def _starts_phrase(tokens: TokenStream) -> bool:
     after = tokens.peek()
     if after.kind is TokenKind.STRING:
         return tokens.matches_word(*STATEMENTS_BEFORE_TEXT)
+    if tokens.matches_word(*STATEMENTS_BEFORE_NAME):
+        return after.kind is _NAME
     return after.kind is _NAME and STATEMENT_PHRASES.get(tokens.current.key) == after.key
 
 

@@ -78,10 +78,19 @@ class Grasp(Node):
 
 @attrs.frozen
 class Operate(Node):
-    """``OPERATE device [ON | OFF]``."""
+    """``OPERATE device [ON | OFF]``, or ``OPERATE device TO value``."""
 
     device: Mobile
     on: bool = True
+    value: Expression | None = None
+
+
+@attrs.frozen
+class Pulse(Node):
+    """``PULSE device FOR seconds``."""
+
+    device: Mobile
+    duration: Expression
 
 
 @attrs.frozen
@@ -105,7 +114,7 @@ class ZeroForce(Node):
     arm: Mobile
 
 
-DeviceStatement: TypeAlias = Open | Grasp | Operate | ReadVisions | ReadSystem | ZeroForce
+DeviceStatement: TypeAlias = Open | Grasp | Operate | Pulse | ReadVisions | ReadSystem | ZeroForce
 
 
 @attrs.frozen
@@ -281,6 +290,16 @@ class Wait(Node):
 
 
 @attrs.frozen
+class WaitUntil(Node):
+    """``WAIT UNTIL condition [WITHIN seconds [ELSE statement]]``; ``head`` reaches up to ELSE."""
+
+    head: Span
+    condition: Expression
+    limit: Expression | None = None
+    otherwise: "Statement | None" = None
+
+
+@attrs.frozen
 class Pause(Node):
     """``PAUSE seconds``."""
 
@@ -332,7 +351,22 @@ class Call(Node):
 
 
 ControlStatement: TypeAlias = (
-    Block | If | While | Repeat | For | Cobegin | Signal | Wait | Pause | Lock | Try | Retry | Halt | Return | Call
+    Block
+    | If
+    | While
+    | Repeat
+    | For
+    | Cobegin
+    | Signal
+    | Wait
+    | WaitUntil
+    | Pause
+    | Lock
+    | Try
+    | Retry
+    | Halt
+    | Return
+    | Call
 )
 
 

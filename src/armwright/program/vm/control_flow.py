@@ -9,7 +9,7 @@ from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.language.source import Span
 from armwright.program.vm.calls import CALLS, leave_activation
 from armwright.program.vm.contact import contact_report, record_contact, stop_arm
-from armwright.program.vm.machine import Handler, Machine, RunError, jump_target
+from armwright.program.vm.machine import MAX_PAUSE, Handler, Machine, RunError, jump_target
 from armwright.program.vm.move import halt_motion
 from armwright.program.vm.process import (
     Activation,
@@ -20,11 +20,10 @@ from armwright.program.vm.process import (
     WaitReason,
 )
 from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
+from armwright.program.vm.wait_until import too_late, wait_until
 
 # A time this part of a period behind a tick is on it.
 _ROUNDING = 1e-9
-# The longest pause; more is a slip of units [s].
-_MAX_PAUSE = 1e6
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------
@@ -91,9 +90,9 @@ def end_process(machine: Machine, process: Process) -> None:
 
 def _pause(machine: Machine, process: Process, step: Instruction) -> None:
     seconds = machine.read_number(process, step.operands[0], step.span)
-    if not 0 <= seconds <= _MAX_PAUSE:
+    if not 0 <= seconds <= MAX_PAUSE:
         text = f"a PAUSE of {seconds:g} s is not possible"
-        raise machine.error(process, "E231", text, step.span, f"expected 0 to {_MAX_PAUSE:g} s")
+        raise machine.error(process, "E231", text, step.span, f"expected 0 to {MAX_PAUSE:g} s")
     pending = PendingEffect(kind="PAUSE", text=f"PAUSE {seconds:g}", start=machine.next_start(), span=step.span)
     machine.schedule_effect(process, seconds, pending)
 
@@ -250,6 +249,8 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.QUIT: _quit,
     Op.SIG: signal,
     Op.WAIT: wait,
+    Op.UNTIL: wait_until,
+    Op.LATE: too_late,
     Op.PAUSE: _pause,
     Op.LOCK: lock,
     Op.UNLK: unlock,

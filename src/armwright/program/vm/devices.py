@@ -8,7 +8,7 @@ from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.vm.collisions import held_parts, note_released
 from armwright.program.vm.contact import recompute_efforts, record_contact, update_depth_alarm
-from armwright.program.vm.machine import Handler, Machine, pose_data
+from armwright.program.vm.machine import MAX_PAUSE, Handler, Machine, pose_data
 from armwright.program.vm.process import PendingEffect, Process
 from armwright.program.vm.recording import TimedKind
 
@@ -56,6 +56,29 @@ def _operate(machine: Machine, process: Process, step: Instruction) -> None:
     machine.schedule_effect(process, time, pending)
 
 
+def _set_output(machine: Machine, process: Process, step: Instruction) -> None:
+    device, value = str(step.operands[0]), machine.read_number(process, step.operands[1], step.span)
+    try:
+        machine.hardware.set_output(device, value)
+    except DeviceError as error:
+        raise machine.error(process, "R602", str(error), step.span, "the device is asked here") from None
+    text = f"{machine.spelling(device)} TO {value:.6g}"
+    machine.record_effect(process, "OPERATE", text, step.span, data={"device": device, "value": value})
+
+
+def _pulse(machine: Machine, process: Process, step: Instruction) -> None:
+    device, seconds = str(step.operands[0]), machine.read_number(process, step.operands[1], step.span)
+    if not 0 < seconds <= MAX_PAUSE:
+        text = f"a pulse of {seconds:g} s is not possible"
+        raise machine.error(process, "E231", text, step.span, f"expected more than 0, and at most {MAX_PAUSE:g} s")
+    try:
+        machine.hardware.pulse(device, seconds)
+    except DeviceError as error:
+        raise machine.error(process, "R602", str(error), step.span, "the device is asked here") from None
+    text = f"{machine.spelling(device)} PULSE {seconds:.6g}"
+    machine.record_effect(process, "OPERATE", text, step.span, data={"device": device, "seconds": seconds})
+
+
 def _read_visions(machine: Machine, process: Process, step: Instruction) -> None:
     name = machine.resolve_name(process, step.operands[0])
     try:
@@ -88,6 +111,8 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.OPEN: _move_fingers,
     Op.GRASP: _move_fingers,
     Op.OPER: _operate,
+    Op.OPSET: _set_output,
+    Op.PULSE: _pulse,
     Op.READV: _read_visions,
     Op.READS: _read_system,
     Op.ZEROF: _zero_force,

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 
+from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
@@ -86,6 +87,21 @@ def _time(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], machine.now, step.span)
 
 
+def _signal(machine: Machine, process: Process, step: Instruction) -> None:
+    """Read an input or a device."""
+    name, is_input = str(step.operands[1]), step.op in (Op.INPUT, Op.ANALOG)
+    try:
+        if is_input:
+            value = machine.hardware.read_input(name, analogue=step.op is Op.ANALOG)
+        else:
+            value = machine.hardware.read_output(name)
+    except DeviceError as error:
+        code = "R608" if is_input else "R602"
+        raise machine.error(process, code, str(error), step.span, "it is read here") from None
+    is_truth = step.op in (Op.INPUT, Op.OUTPUT)
+    machine.write(process, step.operands[0], value != 0 if is_truth else value, step.span)
+
+
 HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
@@ -94,6 +110,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.ELEM: _element,
     Op.FORCE: _force,
     Op.TIME: _time,
+    **dict.fromkeys((Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING), _signal),
     Op.TEXT: _text,
     Op.LOADB: _truth,
 }

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # A time this part of a period behind a tick is on it.
 _TICK_TOLERANCE = 1e-9
+# The longest PAUSE, pulse or WAIT; more is a slip of units [s].
+MAX_PAUSE = 1e6
 # Frame trees that are kept; a page shows fewer.
 _MAX_TREES = 2000
 

@@ -235,16 +235,18 @@ class WaitReason:
     """Why a process does not go on.
 
     Attributes:
-        kind: for an event, for locks, or for the processes that it has begun.
+        kind: for an event, for locks, for the processes that it has begun, or for a condition.
         names: of the event or the locked variables.
         span: the statement.
         start: when it began to wait.
+        deadline: of a condition, when it is too late [ticks]; None where it never is.
     """
 
-    kind: Literal["event", "locks", "branches"]
+    kind: Literal["event", "locks", "branches", "condition"]
     names: tuple[str, ...]
     span: Span
     start: StartTime
+    deadline: int | None = None
 
 
 @attrs.frozen(kw_only=True)

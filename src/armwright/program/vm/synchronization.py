@@ -14,6 +14,7 @@ def signal(machine: Machine, process: Process, step: Instruction) -> None:
     for other in machine.state.processes:
         if other.waiting and other.waiting.kind == "event" and name in other.waiting.names:
             other.waiting, other.wake_tick = None, machine.state.ticks
+    machine.hardware.note_event(name)
     machine.record_effect(process, "SIGNAL", f"SIGNAL {machine.spelling(name)}", step.span, data={"event": name})
 
 
@@ -25,7 +26,7 @@ def wait(machine: Machine, process: Process, step: Instruction) -> None:
         _suspend(process, waiting)
         return
     machine.state.events[name] -= 1
-    _record_wait(machine, process, waiting)
+    record_wait(machine, process, waiting)
 
 
 def lock(machine: Machine, process: Process, step: Instruction) -> None:
@@ -38,7 +39,7 @@ def lock(machine: Machine, process: Process, step: Instruction) -> None:
     for name in names:
         machine.state.locks[name] = process
     process.locks += names
-    _record_wait(machine, process, waiting)
+    record_wait(machine, process, waiting)
 
 
 def unlock(machine: Machine, process: Process, step: Instruction) -> None:
@@ -61,7 +62,7 @@ def release_locks(machine: Machine, process: Process, keep_count: int) -> None:
 def abandon_wait(machine: Machine, process: Process) -> None:
     """Take note of an event or a lock that a process has waited for in vain, when it is ended."""
     if process.unfulfilled_wait is not None:
-        _record_wait(machine, process, process.unfulfilled_wait, in_vain=True)
+        record_wait(machine, process, process.unfulfilled_wait, in_vain=True)
     process.waiting = None
 
 
@@ -71,13 +72,20 @@ def _suspend(process: Process, waiting: WaitReason) -> None:
     process.waiting = process.unfulfilled_wait = waiting
 
 
-def _record_wait(machine: Machine, process: Process, waiting: WaitReason, *, in_vain: bool = False) -> None:
+def record_wait(machine: Machine, process: Process, waiting: WaitReason, *, in_vain: bool = False) -> None:
     """Record what a process has waited for, from the time at which it began to wait."""
+    if waiting.kind == "condition":
+        data: dict[str, object] = {"in_vain": True} if in_vain else {}
+        written = " ".join(machine.code.source.slice(waiting.span).split())
+        text = f"{written}{', in vain' if in_vain else ''}"
+        machine.record_effect(process, "WAIT", text, waiting.span, since=waiting.start, data=data)
+        process.unfulfilled_wait = None
+        return
     names = waiting.names
     is_event = waiting.kind == "event"
     kind: EffectKind = "WAIT" if is_event else "LOCK"
     text = f"{kind} {', '.join(map(machine.spelling, names))}{', in vain' if in_vain else ''}"
-    data: dict[str, object] = {"event": names[0]} if is_event else {"variables": list(names)}
+    data = {"event": names[0]} if is_event else {"variables": list(names)}
     if in_vain:
         data["in_vain"] = True
     machine.record_effect(process, kind, text, waiting.span, since=waiting.start, data=data)

@@ -1,0 +1,55 @@
+"""WAIT UNTIL: a condition that is looked at on every servo tick, until it holds or it is too late."""
+
+import math
+
+from armwright.program.bytecode.instructions import Instruction
+from armwright.program.vm.calls import evaluate_instructions
+from armwright.program.vm.machine import MAX_PAUSE, Machine, jump_target
+from armwright.program.vm.process import Process, WaitReason
+from armwright.program.vm.synchronization import abandon_wait, record_wait
+
+# A time this part of a period behind a tick is on it.
+_TICK_TOLERANCE = 1e-9
+
+
+def wait_until(machine: Machine, process: Process, step: Instruction) -> None:
+    """Look at the condition; where it does not hold, look again on the next tick, until it is too late."""
+    waiting = process.unfulfilled_wait
+    if waiting is None:
+        deadline = _deadline(machine, process, step)
+        waiting = WaitReason("condition", (), step.span, machine.next_start(), deadline)
+    truth = str(step.operands[1])
+    process.stack.append(process.activation.create_nested("condition"))
+    evaluate_instructions(machine, process, machine.code.instructions, jump_target(step, 0))
+    process.stack.pop()
+    if process.activation.temporaries[truth]:
+        process.unfulfilled_wait = waiting
+        record_wait(machine, process, waiting)
+    elif waiting.deadline is not None and machine.state.ticks >= waiting.deadline:
+        process.unfulfilled_wait = waiting
+        abandon_wait(machine, process)
+        process.pc = jump_target(step, 2)
+    else:
+        process.pc -= 1
+        process.unfulfilled_wait, process.wake_tick = waiting, machine.state.ticks + 1
+
+
+def too_late(machine: Machine, process: Process, step: Instruction) -> None:
+    """Say that a condition did not hold in time.
+
+    Raises:
+        RunError: always.
+    """
+    text, label = "the condition of this WAIT did not hold in time", "waited here"
+    raise machine.error(process, "E507", text, step.span, label, helps=["write ELSE and what to do then"])
+
+
+def _deadline(machine: Machine, process: Process, step: Instruction) -> int | None:
+    """Return the tick at which it is too late; None where it never is."""
+    if len(step.operands) < 4:
+        return None
+    seconds = machine.read_number(process, step.operands[3], step.span)
+    if not 0 <= seconds <= MAX_PAUSE:
+        text = f"WITHIN {seconds:g} s is not possible"
+        raise machine.error(process, "E231", text, step.span, f"expected 0 to {MAX_PAUSE:g} s")
+    return machine.state.ticks + math.ceil(seconds / machine.cell.period - _TICK_TOLERANCE)
