@@ -20,7 +20,7 @@ TABLE = {
 
 DECLARED = """
 VAR a, b, c : FRAME ; n : SCALAR ;
-PROCEDURE away() ; BEGIN MOVE ARM_1 TO a * XYZ(0, 0, -0.05) END ;
+PROCEDURE away ; BEGIN MOVE ARM_1 TO a * XYZ(0, 0, -0.05) END ;
 BEGIN
   a = (1,0,0, 0,-1,0, 0,0,-1, 0.40, 0.15,0.20) ;
   b = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.00,0.25) ;

@@ -13,7 +13,7 @@ from armwright.errors import UnknownNameError, UnsupportedArmError
 from armwright.export.checkers.comparison import _Model
 from armwright.export.checkers.posture import PostureReader
 from armwright.export.conventions import ControllerArm, controller_arm, conventions, find_convention
-from armwright.export.writers.posture import confdata, posture, status_and_turn
+from armwright.export.writers.posture import Posture, confdata, postures, status_and_turn
 from armwright.kinematics import forward, inverse
 from export.cases import HERE, mapped_arm, six_axes, wrist_arm
 
@@ -26,6 +26,11 @@ IRB4600 = wrist_arm((495, 175, 1095, 175, 1230.5, 85), "irb4600")
 IRB1660 = wrist_arm((486.5, 150, 700, 110, 678, 135), "irb1660")
 # Published positions end with hundredths of a millimetre.
 HUNDREDTH = 0.008
+
+
+def posture(mapped: ControllerArm, q: np.ndarray) -> Posture:
+    """The posture at joint positions (6,) of the arm."""
+    return postures(mapped, q[None])[0]
 
 
 def flange(mapped: ControllerArm, shown: list[float]) -> np.ndarray:
@@ -65,7 +70,7 @@ def test_turn_of_kuka() -> None:
     mapped = mapped_arm("krl")
     q = _Model(mapped).joints(np.radians(case["q"]))
 
-    assert status_and_turn(mapped, q)[1] == case["T"]
+    assert status_and_turn(posture(mapped, q))[1] == case["T"]
     assert PostureReader(mapped).words(mapped.joints(q))["T"] >= {case["T"]}
 
 
@@ -76,7 +81,7 @@ def test_taught_points_of_kuka(case: dict[str, Any]) -> None:
     q = np.radians([-60.0 if bit else 60.0 for bit in bits])
     mapped = mapped_arm("krl")
 
-    status, turn = status_and_turn(mapped, _Model(mapped).joints(q))
+    status, turn = status_and_turn(posture(mapped, _Model(mapped).joints(q)))
 
     assert turn == case["T"]
     assert (status & 6, not bits[2]) == (case["S"] & 6, True)
@@ -104,9 +109,9 @@ def test_targets_of_an_irb120(case: dict[str, Any]) -> None:
     assert Rotation.from_matrix(X[:3, :3].T @ R).magnitude() < 1e-4
     if "confdata" in case:
         q = _Model(mapped).joints(np.radians(case["q"]))
-        assert list(confdata(mapped, q)) == case["confdata"]
+        assert list(confdata(posture(mapped, q))) == case["confdata"]
         reached = inverse(mapped.arm, forward(mapped.arm, q)).branches
-        assert sum(list(confdata(mapped, branch.q)) == case["confdata"] for branch in reached) == 1
+        assert sum(list(confdata(posture(mapped, branch.q))) == case["confdata"] for branch in reached) == 1
 
 
 @pytest.mark.parametrize("case", PUBLISHED["abb_cfx"], ids=lambda case: f"cfx {case['cfx']}")
@@ -116,20 +121,20 @@ def test_cfx_of_an_irb1660(case: dict[str, Any]) -> None:
     for shown in case["q"]:
         q = _Model(mapped).joints(np.radians(shown))
 
-        assert confdata(mapped, q)[3] == case["cfx"]
+        assert confdata(posture(mapped, q))[3] == case["cfx"]
         assert PostureReader(mapped).words(mapped.joints(q))["cfx"] == {case["cfx"]}
 
 
 def test_all_eight_configurations_differ() -> None:
     """The eight ways in which an IRB 120 or a KR 6 reaches a pose have eight words."""
     rng = np.random.default_rng(5)
-    for target, word in (("rapid", lambda m, q: confdata(m, q)[3]), ("krl", lambda m, q: status_and_turn(m, q)[0])):
+    for target, word in (("rapid", lambda p: confdata(p)[3]), ("krl", lambda p: status_and_turn(p)[0])):
         mapped = mapped_arm(target)
         for _ in range(20):
             q = _Model(mapped).joints(rng.uniform(-0.6, 0.6, 6) + np.radians([0, -60, 80, 0, 40, 0]))
             branches = [branch.q for branch in inverse(mapped.arm, forward(mapped.arm, q), q).branches]
 
-            assert len({word(mapped, branch) for branch in branches}) == len(branches)
+            assert len({word(posture(mapped, branch)) for branch in branches}) == len(branches)
 
 
 @pytest.mark.share(0.02)
@@ -141,8 +146,8 @@ def test_configuration_words_by_two_ways(target: str, sample: Any) -> None:
     for rng in sample.cases(count):
         q = rng.uniform(mapped.arm.limits.lower, mapped.arm.limits.upper)
         words = reader.words(mapped.joints(q))
-        named = dict(zip(("cf1", "cf4", "cf6", "cfx"), confdata(mapped, q), strict=True))
-        status, turn = status_and_turn(mapped, q)
+        named = dict(zip(("cf1", "cf4", "cf6", "cfx"), confdata(posture(mapped, q)), strict=True))
+        status, turn = status_and_turn(posture(mapped, q))
 
         assert all(value in words[name] for name, value in {**named, "S": status, "T": turn}.items()), q
         assert -np.pi <= posture(mapped, q).bend <= np.pi

@@ -116,6 +116,17 @@ def test_every_knot_counts(target: str) -> None:
     assert failed(target, "".join(lines[:middle] + lines[middle : middle + 1] * 2 + lines[middle + 1 :]), KNOTS)
 
 
+@pytest.mark.parametrize(("target", "stop", "passed"), [("krl", "}\n", "} C_PTP\n"), ("rapid", ",fine,", ",z1,")])
+def test_the_last_knot_is_a_stop(target: str, stop: str, passed: str) -> None:
+    """A path that ends without a stop is found."""
+    text = written(target, KNOTS)
+    end = text.rindex(stop)
+
+    assert failed(target, text[:end] + passed + text[end + len(stop) :], KNOTS) == {
+        "statements that differ in kind, text or order"
+    }
+
+
 @pytest.mark.parametrize(
     ("target", "right", "wrong", "quantity"),
     [
@@ -125,6 +136,9 @@ def test_every_knot_counts(target: str) -> None:
         ("urscript", "sleep(0.5000)", "sleep(0.6000)", "durations"),
         ("urscript", "set_tcp(p[0.0000000, ", "set_tcp(p[0.0100000, ", "positions"),
         ("urscript", ", r=0.02000)", ", r=0.02000)\n  sleep(0)", "statements"),
+        ("urscript", ", r=0.02000)", ", r=0.04000)", "corner zones"),
+        ("krl", "$APO.CDIS=20.000", "$APO.CDIS=40.000", "corner zones"),
+        ("rapid", "[FALSE,20.000,", "[FALSE,40.000,", "corner zones"),
         ("krl", "$OUT[2]=TRUE", "$OUT[2]=FALSE", "statements"),
         ("krl", ",S 2,", ",S 3,", "configuration"),
         ("krl", ",S 2,", ",S 0,", "configuration"),

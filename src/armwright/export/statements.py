@@ -3,6 +3,7 @@
 from typing import TypeAlias
 
 import attrs
+import numpy as np
 
 from armwright.arrays import Array, read_only
 from armwright.cell.model import CellArm
@@ -138,3 +139,8 @@ class ControllerProgram:
     deviation: float
     statements: tuple[Statement, ...]
     notes: tuple[str, ...] = ()
+
+    def straight_ends(self) -> Array:
+        """Return the joint positions (k, n) at the ends of all straight lines, in order."""
+        ends = [one.q for one in self.statements if isinstance(one, MoveLines)]
+        return np.concatenate(ends) if ends else np.empty((0, len(self.start)))

@@ -1,6 +1,7 @@
 """Running what a checker has read on the model of the arm, beside the plan."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -150,6 +151,7 @@ class _Comparing:
         self.angles = _Tally("orientations of targets", _ANGLE, "rad")
         self.joints = _Tally("joints at targets, at the ends of straight lines too", _ANGLE, "rad")
         self.postures = _Tally("configuration words that the joints do not have", 0)
+        self.zones = _Tally("corner zones beyond the BLEND of the program, or past half a leg", _PLACE_MM, "mm")
         self.straightness = _Tally("planned path beside lines and knots of the file, of what is allowed", 1)
         self.speeds = _Tally("joint speeds that the file asks for, of the limits", 1 + _ROUNDING)
         self.times = _Tally("durations", _TIME, "s")
@@ -173,6 +175,7 @@ class _Comparing:
             self.angles,
             self.joints,
             self.postures,
+            self.zones,
             self.straightness,
             self.speeds,
             self.times,
@@ -248,8 +251,7 @@ class _Comparing:
     def _lines(self, statement: MoveLines, actions: Iterator[Action]) -> None:
         motion, goal = statement.stage.motion, statement.stage.stage.goal
         poses = statement.poses if goal is None else goal.poses
-        corners = [self._model.pose(self._q[None])[0, :3, 3]]
-        zone, last_zone, line = 0.0, 0.0, 0
+        corners, zones, line = [self._model.pose(self._q[None])[0, :3, 3]], [0.0], 0
         for pose in poses:
             action = self._next(actions, LineAction)
             if action is None:
@@ -263,13 +265,19 @@ class _Comparing:
             if action.duration is not None:
                 self.times.add(abs(action.duration - statement.duration), action.line)
             corners.append(X[:3, 3])
-            zone, last_zone, line = max(zone, action.zone), action.zone, action.line
+            zones.append(action.zone)
+            line = action.line
         self.joints.add(float(np.abs(self._q - motion(motion.duration)).max()), line)
-        self.statements.add(int(last_zone > 0), line)
+        self.statements.add(int(zones[-1] > 0), line)
+        blends = statement.stage.stage.obstacle is None and goal is not None and goal.blend
+        legs = np.linalg.norm(np.diff(corners, axis=0), axis=-1)
+        for leg, (before, after) in zip(legs, pairwise(zones), strict=True):
+            self.zones.add(max(before - leg / 2, after - leg / 2, after - (blends or 0.0), 0.0) * 1e3, line)
         # The planned path is where the straight lines of the file are, but for what was certified and for corners.
         points = self._model.pose(motion(np.linspace(0.0, motion.duration, _LOOKS)))[:, :3, 3]
         far = float(_distances(points, np.array(corners)).max())
-        self.straightness.add(far / ((statement.stage.stage.deviation or 0.0) + zone + _PLACE_MM * 1e-3), line)
+        allowed = (statement.stage.stage.deviation or 0.0) + max(zones) + _PLACE_MM * 1e-3
+        self.straightness.add(far / allowed, line)
 
     def _configuration(self, action: LineAction) -> None:
         """Compare the configuration words of the file with the joints that its lines have led to."""
@@ -300,6 +308,7 @@ class _Comparing:
                 self.statements.add(1, 0 if action is None else action.line)
                 return
             taken.append(action)
+        self.statements.add(int(taken[-1].passes), taken[-1].line)
         streamed = taken[0].streamed
         times = np.linspace(0.0, motion.duration, len(taken) + 1)[1:] if streamed else statement.times
         if streamed:

@@ -3,6 +3,7 @@
 import io
 import json
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -112,7 +113,7 @@ def _plan(times: Array, stages: Sequence[RunStage], start: Array) -> Array:
     """Return the joint positions (k, n) of a run at times (k,), stage by stage."""
     q = np.tile(np.asarray(start, dtype=float), (len(times), 1))
     firsts = np.searchsorted(times, [stage.t0 for stage in stages])
-    for stage, first, last in zip(stages, firsts, [*firsts[1:], len(times)], strict=True):
+    for stage, (first, last) in zip(stages, pairwise([*firsts, len(times)]), strict=True):
         q[first:last] = stage.motion(times[first:last] - stage.t0)
     return q
 

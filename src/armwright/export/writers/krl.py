@@ -18,7 +18,7 @@ from armwright.export.statements import (
 )
 from armwright.export.writers.controller_file import ControllerFile, common_approximations, heading
 from armwright.export.writers.orientations import zyx_angles
-from armwright.export.writers.posture import status_and_turn
+from armwright.export.writers.posture import Posture, postures, status_and_turn
 from armwright.export.writers.reserved_words import KRL
 from armwright.export.writers.text import decimal, decimals, identifier, plain_lines
 
@@ -47,22 +47,32 @@ def write(program: ControllerProgram) -> ControllerFile:
     lines += [f"$TOOL={{{_frame(tool)}}}", "$IPO_MODE=#BASE"]
     lines += [f"BAS(#VEL_PTP,{_TO_START})", f"PTP {{{_axes(program.mapped.joints(program.start))}}}"]
     said = {"BAS(#VEL_PTP,": str(_TO_START)}
+    ends = iter(postures(program.mapped, program.straight_ends()))
     for statement in program.statements:
-        lines += _lines(statement, program, said)
+        lines += _lines(statement, program, said, ends)
     lines.append("END")
     return ControllerFile(
         name=f"{name}.src", text="\n".join(lines) + "\n", approximations=tuple(_approximations(program))
     )
 
 
-def _lines(statement: Statement, program: ControllerProgram, said: dict[str, str]) -> Iterator[str]:
-    """Give the lines of a statement, without settings that have been said and hold still."""
+def _lines(
+    statement: Statement, program: ControllerProgram, said: dict[str, str], ends: Iterator[Posture]
+) -> Iterator[str]:
+    """Give the lines of a statement, without settings that have been said and hold still.
+
+    Args:
+        statement: to be written.
+        program: that it is part of.
+        said: the settings that hold, by what begins their lines.
+        ends: the postures at the ends of all straight lines that are still to be written.
+    """
     match statement:
         case MoveJoints(q=q, speed_part=part):
             yield from _settings(said, {"BAS(#VEL_PTP,": _percent(part)})
             yield f"PTP {{{_axes(program.mapped.joints(q))}}}"
         case MoveLines():
-            yield from _straight(statement, program, said)
+            yield from _straight(statement, program, said, ends)
         case MoveKnots(q=q, speed_part=part):
             yield from _settings(said, {"BAS(#VEL_PTP,": _percent(part), "$APO.CPTP=": str(_KNOT_ZONE)})
             shown = program.mapped.joints(q)
@@ -83,7 +93,9 @@ def _lines(statement: Statement, program: ControllerProgram, said: dict[str, str
                 yield f'$LOOP_MSG[]="{line}"'
 
 
-def _straight(statement: MoveLines, program: ControllerProgram, said: dict[str, str]) -> Iterator[str]:
+def _straight(
+    statement: MoveLines, program: ControllerProgram, said: dict[str, str], ends: Iterator[Posture]
+) -> Iterator[str]:
     speed, turn, acceleration = (
         decimal(max(x, _LEAST), 5)
         for x in (statement.speed, float(np.degrees(statement.turn_speed)), statement.acceleration)
@@ -91,8 +103,8 @@ def _straight(statement: MoveLines, program: ControllerProgram, said: dict[str, 
     wanted = {"$VEL.CP=": speed, "$VEL.ORI1=": turn, "$VEL.ORI2=": turn, "$ACC.CP=": acceleration}
     yield from _settings(said, wanted)
     poses = program.mapped.pose(statement.poses)
-    for pose, q, zone in zip(poses, statement.q, statement.zones, strict=True):
-        status, turns = status_and_turn(program.mapped, q)
+    for pose, zone in zip(poses, statement.zones, strict=True):
+        status, turns = status_and_turn(next(ends))
         if zone:
             yield from _settings(said, {"$APO.CDIS=": decimal(zone * 1e3, 3)})
         yield f"LIN {{{_frame(pose)},S {status},T {turns}}}{' C_DIS' if zone else ''}"

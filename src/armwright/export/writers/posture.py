@@ -27,41 +27,47 @@ class Posture(NamedTuple):
     angles: list[float]
 
 
-def posture(mapped: ControllerArm, q: Array) -> Posture:
-    """Return the posture of an arm at joint positions (6,)."""
+def postures(mapped: ControllerArm, q: Array) -> list[Posture]:
+    """Return the postures of an arm at k joint positions (k, 6)."""
     frames = link_poses(mapped.arm, q)
-    wrist = _common_point(frames[3], frames[4])
-    front = frames[1, :3, :3] @ mapped.front
-    upper, fore = frames[2, :3, 3] - frames[1, :3, 3], wrist - frames[2, :3, 3]
-    axis = frames[2, :3, 2] * mapped.signs[2]
-    upper, fore = upper - axis * (axis @ upper), fore - axis * (axis @ fore)
+    wrists = _common_points(frames[:, 3], frames[:, 4])
+    ahead = _along(frames[:, 1, :3, :3] @ mapped.front, wrists - frames[:, 0, :3, 3])
+    upper, fore = frames[:, 2, :3, 3] - frames[:, 1, :3, 3], wrists - frames[:, 2, :3, 3]
+    axes = frames[:, 2, :3, 2] * mapped.signs[2]
+    upper, fore = (link - axes * _along(axes, link)[:, None] for link in (upper, fore))
+    bends = np.arctan2(_along(axes, np.cross(upper, fore)), _along(upper, fore))
     shown = mapped.joints(q)
-    return Posture(
-        behind=bool(front @ (wrist - frames[0, :3, 3]) < -_ROUNDING),
-        bend=math.atan2(axis @ np.cross(upper, fore), upper @ fore),
-        angles=[0.0 if abs(angle) < _ROUNDING else math.degrees(angle) for angle in shown],
-    )
+    angles = np.where(np.abs(shown) < _ROUNDING, 0.0, np.degrees(shown))
+    return [
+        Posture(behind=bool(front < -_ROUNDING), bend=float(bend), angles=row)
+        for front, bend, row in zip(ahead, bends, angles.tolist(), strict=True)
+    ]
 
 
-def status_and_turn(mapped: ControllerArm, q: Array) -> tuple[int, int]:
-    """Return the status S and the turn T of KRL at joint positions (6,)."""
-    behind, bend, angles = posture(mapped, q)
+def status_and_turn(posture: Posture) -> tuple[int, int]:
+    """Return the status S and the turn T of KRL."""
+    behind, bend, angles = posture
     flipped = angles[4] < 0 if abs(angles[4]) < 180 else angles[4] > 0
     status = behind + 2 * (bend > _ROUNDING) + 4 * flipped
     return status, sum(1 << i for i, angle in enumerate(angles) if angle < 0)
 
 
-def confdata(mapped: ControllerArm, q: Array) -> tuple[int, int, int, int]:
-    """Return cf1, cf4, cf6 and cfx of RAPID at joint positions (6,)."""
-    behind, bend, angles = posture(mapped, q)
+def confdata(posture: Posture) -> tuple[int, int, int, int]:
+    """Return cf1, cf4, cf6 and cfx of RAPID."""
+    behind, bend, angles = posture
     quadrants = [math.floor(angles[i] / 90.0) for i in (0, 3, 5)]
     return quadrants[0], quadrants[1], quadrants[2], 4 * behind + 2 * (bend < -_ROUNDING) + (angles[4] < 0)
 
 
-def _common_point(first: Array, second: Array) -> Array:
-    """Return the point (3,) of the z axis of a frame (4, 4) that is nearest to that of another."""
-    a, b = first[:3, 2], second[:3, 2]
-    apart = second[:3, 3] - first[:3, 3]
-    cosine = a @ b
-    along = (apart @ a * cosine - apart @ b) / (1.0 - cosine * cosine)
-    return np.asarray(second[:3, 3] + along * b)
+def _along(directions: Array, vectors: Array) -> Array:
+    """Return the scalar products (k,) of vectors (k, 3)."""
+    return np.asarray(np.einsum("ki,ki->k", directions, vectors))
+
+
+def _common_points(first: Array, second: Array) -> Array:
+    """Return the points (k, 3) of the z axes of frames (k, 4, 4) that are nearest to those of others."""
+    a, b = first[:, :3, 2], second[:, :3, 2]
+    apart = second[:, :3, 3] - first[:, :3, 3]
+    cosine = _along(a, b)
+    along = (_along(apart, a) * cosine - _along(apart, b)) / (1.0 - cosine * cosine)
+    return np.asarray(second[:, :3, 3] + along[:, None] * b)

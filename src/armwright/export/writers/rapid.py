@@ -18,7 +18,7 @@ from armwright.export.statements import (
 )
 from armwright.export.writers.controller_file import ControllerFile, common_approximations, heading
 from armwright.export.writers.orientations import quaternion
-from armwright.export.writers.posture import confdata
+from armwright.export.writers.posture import Posture, confdata, postures
 from armwright.export.writers.reserved_words import RAPID
 from armwright.export.writers.text import decimal, decimals, identifier, plain_lines
 
@@ -48,20 +48,22 @@ def write(program: ControllerProgram) -> ControllerFile:
         "    ConfL\\Off;",
         f"    {_absolute(program.mapped.joints(program.start), _SLOW, 'fine')};",
     ]
+    ends = iter(postures(program.mapped, program.straight_ends()))
     for statement in program.statements:
-        lines += [f"    {line};" for line in _lines(statement, program)]
+        lines += [f"    {line};" for line in _lines(statement, program, ends)]
     lines += ["  ENDPROC", "ENDMODULE"]
     return ControllerFile(
         name=f"{name}.mod", text="\n".join(lines) + "\n", approximations=tuple(_approximations(program))
     )
 
 
-def _lines(statement: Statement, program: ControllerProgram) -> Iterator[str]:
+def _lines(statement: Statement, program: ControllerProgram, ends: Iterator[Posture]) -> Iterator[str]:
+    """Give the instructions of a statement; ``ends`` are the postures at the ends of all lines still to be written."""
     match statement:
         case MoveJoints(q=q, duration=duration):
             yield _absolute(program.mapped.joints(q), _within(duration), "fine")
         case MoveLines():
-            yield from _straight(statement, program)
+            yield from _straight(statement, program, ends)
         case MoveKnots(q=q, times=times):
             shown, parts = program.mapped.joints(q), np.diff(times, prepend=0.0)
             for i, (knot, part) in enumerate(zip(shown, parts, strict=True), 1):
@@ -90,11 +92,11 @@ def _within(duration: float) -> str:
     return f"{_TIMED}\\T:={decimal(duration, 4)}"
 
 
-def _straight(statement: MoveLines, program: ControllerProgram) -> Iterator[str]:
+def _straight(statement: MoveLines, program: ControllerProgram, ends: Iterator[Posture]) -> Iterator[str]:
     poses = program.mapped.pose(statement.poses)
     speed = [max(statement.speed * 1e3, _LEAST), max(float(np.degrees(statement.turn_speed)), _LEAST)]
-    for pose, q, zone in zip(poses, statement.q, statement.zones, strict=True):
-        configuration = ",".join(map(str, confdata(program.mapped, q)))
+    for pose, zone in zip(poses, statement.zones, strict=True):
+        configuration = ",".join(map(str, confdata(next(ends))))
         target = f"[{_frame(pose)},[{configuration}],{_NO_AXES}]"
         how = _within(statement.duration) if len(poses) == 1 else f"[{','.join(decimals(speed, 3))},{_EXTERNAL}]"
         yield f"MoveL {target},{how},{_zone(zone)},{_TOOL}\\WObj:=wobj0"
