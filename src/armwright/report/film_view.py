@@ -61,12 +61,16 @@ class FilmView:
         self._frame(size)
         axes.set(xlim=(0, size[0]), ylim=(0, size[1]), facecolor=_SKY)
         axes.set_axis_off()
-        axes.add_collection(LineCollection(list(self._floor_lines()), colors=_FLOOR, linewidths=0.8))
-        self._shadows = axes.add_collection(PolyCollection([], facecolors=_SHADOW, edgecolors=_SHADOW, linewidths=0.3))
-        self._bodies = axes.add_collection(PolyCollection([], linewidths=0.3))
-        self._trails: list[Any] = [axes.plot([], [], color=_PATH, linewidth=1.8, alpha=0.85)[0] for _ in tips]
+        self._shadows = PolyCollection([], facecolors=_SHADOW, edgecolors=_SHADOW, linewidths=0.3)
+        self._bodies = PolyCollection([], linewidths=0.3)
+        floor = LineCollection(self._floor_lines(), colors=_FLOOR, linewidths=0.8)
+        for order, collection in enumerate((floor, self._shadows, self._bodies)):
+            collection.set_zorder(order)
+            axes.add_collection(collection)
+        above: dict[str, Any] = {"zorder": 3}
+        self._trails = [axes.plot([], [], color=_PATH, linewidth=1.8, alpha=0.85, **above)[0] for _ in tips]
         self._tips = [self._seen(tip)[0] for tip in tips]
-        axes.plot(*self._seen(marks)[0].T, "o", color=_MARK, markersize=4.5)
+        axes.plot(*self._seen(marks)[0].T, "o", color=_MARK, markersize=4.5, **above)
 
     def show(self, i: int) -> None:
         """Draw the instant of a number."""

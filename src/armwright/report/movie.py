@@ -79,7 +79,8 @@ def _images(
     from PIL import Image  # noqa: PLC0415
 
     figure = Figure(figsize=_SIZE, dpi=_DPI)
-    canvas, axes = FigureCanvasAgg(figure), figure.add_axes((0, 0, 1, 1))
+    canvas: Any = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
     size = canvas.get_width_height()
     view = FilmView(animation, axes, size, marks)
     clock = axes.text(0.03, 0.94, "", transform=axes.transAxes, color="#1b2430")

@@ -354,7 +354,8 @@ class Workbench:
         known = self._known.get(what)
         if known is None or known[0] != key:
             known = self._known[what] = key, make()
-        return known[1]  # type: ignore[no-any-return] # what this maker has made
+        made: _T = known[1]
+        return made
 
     def _arm_state(self, arm: LiveArm) -> dict[str, Any]:
         opening = arm.placed.gripper_or_usual.opening
