@@ -97,7 +97,7 @@ def log_warnings(arm: Arm, logs: Sequence[Log]) -> Iterator[str]:
 
 def effort_warnings(arm: Arm, motions: Sequence[Motion]) -> Iterator[str]:
     """Give a warning of efforts that have nothing to do with what the drawing of an arm asks for."""
-    if not all(link.mass > 0 and not link.unknown for link in arm.links):
+    if any(link.unknown for link in arm.links) or not any(link.mass for link in arm.links):
         return
     measured = np.concatenate([motion.tau[::10] for motion in motions])
     states = [np.concatenate([getattr(motion, name)[::10] for motion in motions]) for name in ("q", "qd", "qdd")]

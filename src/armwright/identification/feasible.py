@@ -180,6 +180,11 @@ def link_of(theta: Array) -> Link:
 # ---- the program -----------------------------------------------------------------------------------------------------
 
 
+def body_sizes(arm: Arm, count: int) -> Array:
+    """Return how large parameters (count,) of such links may be as the drawing has them: 1 for those of drives."""
+    return _scales(count, [_pseudo_inertia(body) for body in _drawing(arm)])
+
+
 def ball(mass: float) -> Array:
     """Return the pseudo-inertia (4, 4) of a ball about its middle, of which nothing is known but its mass [kg]."""
     spread = mass * _UNKNOWN_RADIUS**2 / 5

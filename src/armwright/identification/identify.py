@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, read_only
+from armwright.arrays import Array
 from armwright.errors import MissingExtraError, TooFewError
 from armwright.identification.checks import (
     effort_warnings,
@@ -20,11 +19,13 @@ from armwright.identification.checks import (
 )
 from armwright.identification.delay import with_delay
 from armwright.identification.equations import equations
-from armwright.identification.feasible import Standard, feasible
+from armwright.identification.feasible import feasible
 from armwright.identification.fitting import Fit, Sums, robust, summed, weighted
-from armwright.identification.friction import LAWS, Law, held_share, predicted
+from armwright.identification.friction import LAWS, Law, held_share
+from armwright.identification.identifiability import weak_parameters
 from armwright.identification.log import Log
 from armwright.identification.model import DynamicModel
+from armwright.identification.result import Choice, Identification, Prediction, predict
 from armwright.identification.signals import BORDER, Motion, Preparation, cut, motions, preparation_of
 
 # Cut-off frequencies that are tried beside the one at which what is filtered off is white.
@@ -35,92 +36,6 @@ _WEIGHTS = (1.0, 30.0, 1000.0)
 _LEAST_BLOCK, _BLOCKS_PER_FOLD = 1.0, 2
 # A law of friction is worth its terms if it predicts held-out blocks better by so many standard errors, and this part.
 _WORTH, _LEAST_GAIN = 1.0, 0.002
-
-
-class Choice(NamedTuple):
-    """An alternative that was tried on held-out blocks.
-
-    Attributes:
-        what: ``filter``, ``friction`` or ``drawing``.
-        option: its name.
-        error: root mean square of held-out residuals, those of each joint by the standard deviation of its own.
-        chosen: whether it was chosen.
-    """
-
-    what: str
-    option: str
-    error: float
-    chosen: bool
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Prediction:
-    """How well efforts of a motion are predicted that nothing was fitted to.
-
-    Attributes:
-        name: of the log.
-        t: (k,) times [s].
-        measured: (k, n) efforts [N m] or [N].
-        predicted: (k, n) the same by the model.
-    """
-
-    name: str
-    t: Array = attrs.field(converter=read_only)
-    measured: Array = attrs.field(converter=read_only)
-    predicted: Array = attrs.field(converter=read_only)
-
-    @property
-    def rms(self) -> Array:
-        """(n,) root mean squares of the errors [N m] or [N]."""
-        return np.asarray(np.sqrt(((self.measured - self.predicted) ** 2).mean(axis=0)))
-
-    @property
-    def relative(self) -> Array:
-        """(n,) the same by the root mean square of the efforts."""
-        size = np.sqrt((self.measured**2).mean(axis=0))
-        return np.asarray(self.rms / np.maximum(size, np.finfo(float).tiny))
-
-    @property
-    def correlation(self) -> Array:
-        """(n,) correlations of measured and predicted efforts."""
-        a, b = self.measured - self.measured.mean(axis=0), self.predicted - self.predicted.mean(axis=0)
-        lengths = np.linalg.norm(a, axis=0) * np.linalg.norm(b, axis=0)
-        return np.asarray((a * b).sum(axis=0) / np.maximum(lengths, np.finfo(float).tiny))
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Identification:
-    """What was identified.
-
-    Attributes:
-        model: of the arm, with the law of friction that was chosen.
-        law: its name.
-        preparation: how motions were made of readings.
-        fit: of the base parameters.
-        standard: parameters of links and drives that can be; None without Clarabel.
-        held: share of dry friction that joints keep when they have stopped.
-        choices: what was tried on held-out blocks.
-        validation: of logs or blocks that were held out from everything, by the base parameters.
-        validation_of_arm: the same by ``standard``, as the arm file has it; empty without.
-        training: of the logs that were fitted to.
-        delay_error: standard error of the delay [s].
-        speeds: (n,) greatest speeds of the joints [rad/s] or [m/s].
-        warnings: of unusual logs.
-    """
-
-    model: DynamicModel
-    law: str
-    preparation: Preparation
-    fit: Fit
-    standard: Standard | None
-    held: float
-    choices: tuple[Choice, ...]
-    validation: tuple[Prediction, ...]
-    validation_of_arm: tuple[Prediction, ...]
-    training: tuple[Prediction, ...]
-    delay_error: float
-    speeds: Array
-    warnings: tuple[str, ...]
 
 
 def identify(
@@ -216,28 +131,9 @@ def identify(
         training=tuple(predict(model, fit.values, motion, preparation, held) for motion in all_motions),
         delay_error=delay_error,
         speeds=speeds,
+        weak=tuple(weak_parameters(model, fit)),
         warnings=tuple(warnings),
     )
-
-
-def predict(model: DynamicModel, values: Array, motion: Motion, preparation: Preparation, held: float) -> Prediction:
-    """Return how well the efforts of a motion are predicted, averaged over as many readings as equations are.
-
-    Args:
-        model: of the arm.
-        values: (b,) base parameters.
-        motion: of the arm.
-        preparation: of the motion.
-        held: share of dry friction that joints keep when they have stopped.
-    """
-    tau = predicted(model, values, motion, preparation.slow, held)
-    size = preparation.decimation
-    count = len(tau) // size * size
-
-    def averaged(values: Array) -> Array:
-        return np.asarray(values[:count].reshape(-1, size, *values.shape[1:]).mean(axis=1))
-
-    return Prediction(name=motion.name, t=averaged(motion.t), measured=averaged(motion.tau), predicted=averaged(tau))
 
 
 def hold_out(log: Log, how: str, *, share: float = 0.25, seconds: float | None = None) -> tuple[list[Log], list[Log]]:

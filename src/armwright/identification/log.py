@@ -16,7 +16,7 @@ _GAP = 5.0
 _EVEN = 0.01
 # Fewer samples than this are no motion.
 LEAST_SAMPLES = 50
-# A step of positions is motion if it is larger than this part of the largest.
+# Positions move if they change faster than this part of nearly the fastest.
 _MOVES = 0.05
 # So many equal readings in a row at the largest magnitude of a joint are clipped.
 _CLIPPED = 4
@@ -89,8 +89,8 @@ class Log:
 
         What a joint that stands before and after a program is held by, brakes or drives, nobody knows.
         """
-        steps = np.abs(np.diff(self.q, axis=0)).max(axis=1)
-        active = np.flatnonzero(steps > _MOVES * steps.max(initial=0.0))
+        rates = np.abs(np.diff(self.q, axis=0)).max(axis=1) / np.diff(self.t)
+        active = np.flatnonzero(rates > _MOVES * np.quantile(rates, 0.99))
         if not len(active):
             return self
         first, last = max(0, int(active[0]) - LEAST_SAMPLES // 2), int(active[-1]) + LEAST_SAMPLES // 2

@@ -23,7 +23,7 @@ from armwright.errors import InvalidValueError, one_of
 TERMS = ("rotor", "viscous", "coulomb", "forward", "backward", "offset", "cube_root", "stribeck", "stiffness")
 # What the motor of a coupled joint contributes by its own speed, beside what joints have by theirs.
 _COUPLED_TERMS = ("rotor", "viscous", "coulomb")
-_LINK_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+LINK_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 # Speed at which 1/e of Stribeck friction is left, where nothing is known of it [rad/s, m/s].
 STRIBECK_SPEED = 0.1
 # States that show which columns are independent.
@@ -87,7 +87,7 @@ class DynamicModel:
         """Names of the p parameters: ``m1``, ``mx1``, ``Izz2``, ``rotor1``, ``viscous1``, ``coupled_rotor6``."""
         n, coupled = self.arm.n, [i for i in _COUPLED_TERMS if i in self.terms]
         return (
-            *(f"{name}{i}" for i in range(1, n + 1) for name in _LINK_NAMES),
+            *(f"{name}{i}" for i in range(1, n + 1) for name in LINK_NAMES),
             *(f"{term}{i}" for i in range(1, n + 1) for term in self.terms),
             *(f"coupled_{term}{i + 1}" for i in self.coupled_motors for term in coupled),
         )

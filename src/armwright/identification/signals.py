@@ -16,7 +16,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, Flags, read_only
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, TooFewError
 from armwright.identification.log import LEAST_SAMPLES, Log
 
 # Order of the filter, which is run forward and backward.
@@ -179,8 +179,13 @@ def white_cutoff(logs: Sequence[Log]) -> float:
 
     That of several is chosen for which what the filter takes off is most nearly white: a lower one takes off motion as
     well, a higher one leaves noise.
+
+    Raises:
+        TooFewError: there is no part without gaps that is long enough.
     """
     pieces = [piece.take(slice(_SHOWN)) for log in logs for piece in log.pieces()]
+    if not pieces:
+        raise TooFewError(f"no log has {LEAST_SAMPLES} readings in a row without a gap")
     rate = 1 / pieces[0].period
     scores = []
     for part in _TRIED:
