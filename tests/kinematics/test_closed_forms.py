@@ -328,7 +328,7 @@ def test_straight_wrist_is_flagged(rng: np.random.Generator) -> None:
 def test_beside_a_singularity(name: str, gap: float, rng: np.random.Generator) -> None:
     """However near the singularity of the two last turns of a class is, the branches meet their pose."""
     arm = _build(name, rng)
-    for q in random_configurations(arm, rng, 20):
+    for q in random_configurations(arm, rng, 5):
         for joint in range(1, 5):
             moved = q.copy()
             moved[joint] = gap
