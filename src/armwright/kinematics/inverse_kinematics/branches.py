@@ -57,12 +57,10 @@ class ClosedForm(ABC):
     Attributes:
         signs: of each branch, which of the two answers each choice takes.
         choosers: the joints that some pose leaves open, from 1: they stay where the arm is.
-        parameter: of an arm with a joint too many, what is kept as it is; empty otherwise.
     """
 
     signs: tuple[tuple[Sign, ...], ...]
     choosers: tuple[int, ...]
-    parameter: str = ""
 
     @abstractmethod
     def solve(self, R_BT: Matrix, p_BT: Vector, near: Vector, signs: Sequence[Sign]) -> Solved:

@@ -135,7 +135,6 @@ def _redundant(axes: Axes) -> Iterator[ClosedForm]:
             yield Locked(
                 signs=form.signs,
                 choosers=tuple(number + (number >= joint) for number in form.choosers),
-                parameter=f"joint {joint}",
                 joint=joint,
                 rest=form,
                 kind=axes.kinds[held],

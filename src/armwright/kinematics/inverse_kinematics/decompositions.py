@@ -75,32 +75,13 @@ class OfAxes(ClosedForm):
         """
         signs = list(self.signs[branch])
         if self.arm_end is not None:
-            signs[:2] = self._stance(q, self.arm_end)
+            signs[:2] = stance(self.axes, q, self.arm_end)
         return label_of(self.deciding, signs)
 
     @property
     def arm_end(self) -> Array | None:
         """The point (3,) at the end of the forearm, if axes 2 and 3 are parallel and at a right angle to axis 1."""
         return None
-
-    def _stance(self, q: Array, end: Array) -> tuple[Sign, Sign]:
-        """Return whether an arm stands to the left, and whether its elbow is up, each 1 or -1.
-
-        It stands to the left where it reaches out on the side that joint 1 faces, with the plane of the arm on the left
-        of that; its elbow is up where it is above the line from joint 2 to the end of the forearm.
-        """
-        o, h = self.axes.points, self.h
-        places = [o[1], o[2], end]
-        for i in (2, 1, 0):
-            moved = [add(rotated(h[i], q[i], (p - o[i]).tolist()), o[i].tolist()) for p in places[i:]]
-            places[i:] = [np.array(p) for p in moved]
-        shoulder, at_elbow, at_end = places
-        y = np.array(rotated(h[0], q[0], h[1]))
-        y = -y if (at_end - o[0]) @ y < -SAME else y
-        left = (at_end - o[0]) @ np.cross(y, h[0]) > 0
-        span, upper = (v - y * (v @ y) for v in (at_end - shoulder, at_elbow - shoulder))
-        lift = upper - span * (upper @ span) / max(span @ span, SAME**2)
-        return 1 if left else -1, 1 if lift @ np.array(h[0]) > 0 else -1
 
     @property
     @abstractmethod
@@ -126,6 +107,31 @@ class Decomposed(OfAxes):
             near: joint positions; what the displacement leaves open takes its value from here.
             signs: those of the branch.
         """
+
+
+def stance(axes: Axes, q: Array, end: Array) -> tuple[Sign, Sign]:
+    """Return whether an arm stands to the left, and whether its elbow is up, each 1 or -1.
+
+    It stands to the left where it reaches out on the side that joint 1 faces, with the plane of the arm on the left
+    of that; its elbow is up where it is above the line from joint 2 to the end of the forearm.
+
+    Args:
+        axes: of an arm whose axes 2 and 3 are parallel and at a right angle to axis 1.
+        q: (n,) joint positions.
+        end: (3,) the end of the forearm at joint positions 0 [m].
+    """
+    o, h = axes.points, axes.directions.tolist()
+    places = [o[1], o[2], end]
+    for i in (2, 1, 0):
+        moved = [add(rotated(h[i], q[i], (p - o[i]).tolist()), o[i].tolist()) for p in places[i:]]
+        places[i:] = [np.array(p) for p in moved]
+    shoulder, at_elbow, at_end = places
+    y = np.array(rotated(h[0], q[0], h[1]))
+    y = -y if (at_end - o[0]) @ y < -SAME else y
+    left = (at_end - o[0]) @ np.cross(y, h[0]) > 0
+    span, upper = (v - y * (v @ y) for v in (at_end - shoulder, at_elbow - shoulder))
+    lift = upper - span * (upper @ span) / max(span @ span, SAME**2)
+    return 1 if left else -1, 1 if lift @ np.array(h[0]) > 0 else -1
 
 
 def label_of(joints: Sequence[int], signs: Sequence[Sign]) -> str:

@@ -14,6 +14,7 @@ Source:
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -23,7 +24,8 @@ from numpy.typing import NDArray
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.kinematics.inverse_kinematics.axes import joint_axes
+from armwright.kinematics.inverse_kinematics.axes import are_parallel, are_perpendicular, joint_axes
+from armwright.kinematics.inverse_kinematics.decompositions import label_of, stance
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse, ranked, search_from
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution
 from armwright.spatial.rotations import rotation_vector
@@ -136,7 +138,21 @@ def every_solution(arm: Arm, X: Array, near: Array) -> InverseSolution:
     starts = np.concatenate(ends).real[np.concatenate(real)]
     starts = np.where(arm.revolute, np.remainder(starts + math.pi, _TURN) - math.pi, starts * fibre.chain.size)
     solutions = search_from(arm, X, near, starts, more=not regular)
-    return numeric_inverse(arm, X, near) if not len(solutions) else ranked(arm, X, near, solutions)
+    return numeric_inverse(arm, X, near) if not len(solutions) else ranked(arm, X, near, solutions, _name(arm))
+
+
+def _name(arm: Arm) -> Callable[[Array], str] | None:
+    """Return what names configurations by how shoulder and elbow stand; None where the axes do not tell."""
+    axes = joint_axes(arm)
+    w = axes.directions
+    if axes.kinds != "RRRRRR" or not are_parallel(w[1], w[2]) or not are_perpendicular(w[0], w[1]):
+        return None
+    end = axes.points[3]
+    if not are_parallel(w[2], w[3]) and not are_parallel(w[3], w[4]):
+        # The forearm ends where axis 4 comes nearest to axis 5.
+        across = np.cross(w[3], w[4])
+        end = end + w[3] * (np.cross(axes.points[4] - end, w[4]) @ across) / (across @ across)
+    return lambda q: label_of((1, 3), stance(axes, q, end)) + ", wrist"
 
 
 @lru_cache(maxsize=64)  # found once for an arm, with some hundred paths

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Callable
 
 import attrs
 import numpy as np
@@ -134,9 +136,12 @@ def search_from(arm: Arm, X: Array, near: Array, starts: Array, *, more: bool) -
     return reached
 
 
-def ranked(arm: Arm, X: Array, near: Array, reached: Array) -> InverseSolution:
-    """Return the solution made of configurations (k, n) that meet a pose, numbered."""
-    return rank(arm, X, _named(_unlimited(arm, X), reached, near), near, apart=_SAME_CONFIGURATION)
+def ranked(
+    arm: Arm, X: Array, near: Array, reached: Array, name: Callable[[Array], str] | None = None
+) -> InverseSolution:
+    """Return the solution made of configurations (k, n) that meet a pose; those of one name are numbered."""
+    named = _named(_unlimited(arm, X), reached, near, name or (lambda _: "numeric"))
+    return rank(arm, X, named, near, apart=_SAME_CONFIGURATION)
 
 
 def descend_from(arm: Arm, X: Array, near: Array) -> Array:
@@ -183,14 +188,16 @@ def _search(task: _Task, near: Array) -> tuple[Array, Array]:
     return tried, reached
 
 
-def _named(task: _Task, reached: Array, near: Array) -> list[Candidate]:
+def _named(task: _Task, reached: Array, near: Array, name: Callable[[Array], str]) -> list[Candidate]:
     """Number the configurations, nearest first, one of each free family."""
     solutions: list[Candidate] = []
+    names: Counter[str] = Counter()
     nearest = (nearest_equivalent(task.arm, q, near) for q in reached)
     for q in sorted(nearest, key=lambda q: (bool(violations(task.arm, q)), joint_distance(task.arm, near, q))):
         if any(_same(task.arm, q, other) for other in solutions):
             continue
-        solutions.append(Candidate(q, f"numeric {len(solutions) + 1}", _free_joints(task, q)))
+        names[word := name(q)] += 1
+        solutions.append(Candidate(q, f"{word} {names[word]}", _free_joints(task, q)))
     return solutions
 
 

@@ -65,7 +65,6 @@ class Swivelling(Redundant, OfAxes):
     shoulder: Array
     wrist: Array
     elbow: Array
-    parameter: str = "swivel"
 
     @property
     def deciding(self) -> tuple[int, ...]:
