@@ -109,7 +109,8 @@ def lock(context: Context, node: tree.Lock) -> None:
 def try_(context: Context, node: tree.Try) -> None:
     """Generate both parts of a TRY."""
     out = context.out
-    attempt = out.emit(Op.TRY, LATER, span=node.span)
+    kinds = (kind.key for kind in node.kinds if isinstance(kind, tree.Name))
+    attempt = out.emit(Op.TRY, LATER, *kinds, span=node.span)
     context.generate(*node.body)
     succeeded = out.emit(Op.ENDT, LATER, span=node.span)
     out.patch_jump(attempt)
@@ -121,6 +122,12 @@ def try_(context: Context, node: tree.Try) -> None:
 def halt(context: Context, node: tree.Halt) -> None:
     """Generate one HALT: of the MOVE in an action, else of the program."""
     context.out.emit(Op.MVHLT if context.in_action else Op.HALT, span=node.span)
+
+
+def raise_(context: Context, node: tree.Raise) -> None:
+    """Generate one RAISE."""
+    text = () if node.text is None else (context.out.value(node.text),)
+    context.out.emit(Op.RAISE, node.kind.key, *text, span=node.span)
 
 
 def call(context: Context, node: tree.Call) -> None:
@@ -144,6 +151,7 @@ GENERATORS: Generators = {
     tree.Try: try_,
     tree.Retry: one_instruction(Op.RETRY),
     tree.Halt: halt,
+    tree.Raise: raise_,
     tree.Return: one_instruction(Op.RETV),
     tree.Call: call,
 }

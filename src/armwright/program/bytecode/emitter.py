@@ -125,8 +125,8 @@ class Emitter:
     def _value_of_language(self, node: tree.Name, into: str | None) -> Operand:
         if node.key != "PI":
             to = into or self.passing()
-            if node.key == "TIME":
-                return self._operation(Op.TIME, to, node=node)
+            if node.key in ("TIME", "MESSAGE"):
+                return self._operation(Op[node.key], to, node=node)
             return self._operation(Op.LOADB, to, node.key, node=node)
         return math.pi if into is None else self._operation(Op.COPY, into, math.pi, node=node)
 

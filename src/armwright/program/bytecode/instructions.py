@@ -84,6 +84,7 @@ class Op(enum.StrEnum):
     MOD = "MOD", "N=NN"  # to, dividend, divisor: the remainder
     MIN = "MIN", "N=NN+"  # to, values: the smallest
     MAX = "MAX", "N=NN+"
+    MESSAGE = "MESSAGE", "W="  # to: of the error that was recovered last
     TIME = "TIME", "N="  # to: the time on the clock of the cell
     FORCE = "FORCE", "N=a"  # to, axis
     INPUT = "INPUT", "T=w"  # to, input: whether it is on
@@ -136,7 +137,8 @@ class Op(enum.StrEnum):
     PAUSE = "PAUSE", "N"  # seconds
     LOCK = "LOCK", "n+"  # variables or elements
     UNLK = "UNLK", "n+"  # the same
-    TRY = "TRY", "j"  # place of the recovery
+    TRY = "TRY", "j(w+)"  # place of the recovery[, kinds of errors]
+    RAISE = "RAISE", "w(W)"  # kind of an error[, text]
     ENDT = "ENDT", "j"  # place behind the recovery; nothing went wrong
     ENDR = "ENDR", ""  # end of a recovery
     RETRY = "RETRY", ""  # from the start of the TRY again

@@ -82,7 +82,7 @@ _SIGNATURES = {op: _signature(op) for op in Op}
 # What works a value out: all that a condition may do, beside jumps and its end.
 _OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.CALLF, Op.JZ, Op.RET}
 # All that a function may do.
-_OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RETV, Op.NORET}
+_OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RAISE, Op.RETV, Op.NORET}
 # What may follow MVBEG and the parts of a MOVE.
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 # Which routines an instruction ends, and what else does not lead on to the next.
@@ -93,7 +93,7 @@ _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.MVHLT: (Routine.ACTION,),
     **dict.fromkeys((Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION)),
 }
-_ENDS = {*_ENDED_ROUTINES, Op.JMP, Op.ENDT, Op.RETRY}
+_ENDS = {*_ENDED_ROUTINES, Op.JMP, Op.ENDT, Op.RETRY, Op.RAISE, Op.LATE}
 
 # TRYs and LOCKs in one another; the compiler refuses programs with as many.
 _MAX_NESTING = 200
@@ -389,5 +389,6 @@ _RULES: Mapping[Op, Rule] = {
     Op.ENDT: _end_attempt,
     Op.ENDR: _end_attempt,
     Op.RETRY: _retry,
+    **dict.fromkeys((Op.RAISE, Op.LATE), lambda _verifier, state: Flow(state, falls=False)),
     **dict.fromkeys(_ENDED_ROUTINES, _end_routine),
 }

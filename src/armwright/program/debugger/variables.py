@@ -240,6 +240,8 @@ def _run_variables(machine: Machine, process: Process) -> Iterable[Variable]:
     devices = ", ".join(map(machine.spelling, sorted(machine.hardware.active_devices())))
     yield Variable(name="devices on", value=devices or "none")
     yield Variable(name="arm used last", value=process.last_arm or "none")
+    if process.message:
+        yield Variable(name="message", value=f'"{process.message}"')
     yield Variable(name="priority", value=f"{process.priority:g}")
     if process.locks:
         yield Variable(name="locks", value=", ".join(map(machine.spelling, process.locks)))

@@ -160,7 +160,7 @@ def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> 
                 yield _EventStep(node, name)
         elif isinstance(node, tree.Block | tree.Lock):
             yield from _unconditional_steps(child_statements(node), scope)
-        elif isinstance(node, tree.Halt):
+        elif isinstance(node, tree.Halt | tree.Raise):
             return
 
 

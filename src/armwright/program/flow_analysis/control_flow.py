@@ -219,6 +219,12 @@ def wait_until(context: Context, node: tree.WaitUntil) -> None:
     context.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
 
 
+def raise_(context: Context, node: tree.Raise) -> None:
+    """End the path with an error."""
+    require_value(context.state, node.text)
+    context.state.ended, context.state.end_span = True, node.span
+
+
 def return_(context: Context, node: tree.Return) -> None:
     """End the path of a FUNCTION with its value."""
     require_value(context.state, node.value)
@@ -240,6 +246,7 @@ STEPS: Steps = {
     tree.Try: try_,
     tree.Retry: end,
     tree.Halt: end,
+    tree.Raise: raise_,
     tree.Return: return_,
     tree.Call: call,
     tree.Poison: lambda context, node: context.state.forget(context.side_effects(node)),

@@ -153,17 +153,23 @@ class _Layout:
 
     def _statement(self, node: tree.Statement, column: int) -> None:
         self._row(node.span.start, column, continuation=CLAUSE if isinstance(node, tree.Move) else CONTINUATION)
-        if isinstance(node, tree.Move):
-            self._move(node, column)
-        elif isinstance(node, tree.WaitUntil):
-            self._wait(node, column)
         match node:
+            case tree.Move():
+                self._move(node, column)
+            case tree.WaitUntil():
+                self._wait(node, column)
             case tree.If():
                 self._if(node, column)
             case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body):
                 self._nested(body, column)
             case tree.Block():
                 self._block(node, column)
+            case _:
+                self._parts(node, column)
+
+    def _parts(self, node: tree.Statement, column: int) -> None:
+        """Lay out a statement that has several stretches of statements."""
+        match node:
             case tree.Repeat():
                 self._statements(node.body, column + INDENT)
                 self._row(node.tail.start, column, comment_indent=INDENT)

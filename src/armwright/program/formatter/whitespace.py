@@ -14,7 +14,7 @@ _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
 _OPENING, _CLOSING = frozenset(("(", "[")), frozenset((")", "]"))
 _BRACKETS = _OPENING | _CLOSING
 # What lists in parentheses stand behind, beside names.
-_LIST_WORDS = frozenset(("PRINT", "VIA", "LOCK", "LOG"))
+_LIST_WORDS = frozenset(("PRINT", "VIA", "LOCK", "LOG", "RECOVER"))
 # Before these words a line may end, before operations too, but rather not.
 _PARTS = frozenset(
     ("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "ON", "RIGIDLY", "NONRIGIDLY", "WITHIN")

@@ -60,7 +60,7 @@ RLO_2_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
 RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 
 # Values that need no argument. What a program, its procedures or its cell call so comes first.
-VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE"))
+VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE", "MESSAGE"))
 
 # Types, and what starts a part in front of BEGIN, that are reserved nowhere: programs may use all of them as names.
 TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
@@ -68,7 +68,7 @@ HEADERS_IN_CONTEXT = ("CONST", "FUNCTION")
 # How a parameter is passed, in front of its name.
 PARAMETER_MODES = ("IN", "INOUT")
 # What starts a statement only in front of a name.
-STATEMENTS_BEFORE_NAME = ("PULSE",)
+STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE")
 # What starts a statement only in front of a text.
 STATEMENTS_BEFORE_TEXT = ("LOG",)
 WORDS_IN_CONTEXT = frozenset(
@@ -101,6 +101,9 @@ UNSUPPORTED_STATEMENTS = {
         ("ENDIF", "ENDWHILE", "ENDFOR", "ENDDO", "FI", "OD"),
         "IF, WHILE and FOR contain one statement and have no end keyword; write `BEGIN ... END` around several",
     ),
+    "RAISE": "write `RAISE kind`, with a name for errors of this kind",
+    "PULSE": "write `PULSE device FOR seconds`",
+    "LOG": 'write `LOG "name" (values)`',
     "CALL": "a procedure is called by its name: `name(...)`",
     "RETURN": "a procedure returns at its END; a FUNCTION returns a value by `RETURN value`",
 }

@@ -6,6 +6,7 @@ from itertools import takewhile
 import attrs
 from lsprotocol.types import CompletionItem, CompletionItemKind as Kind, InsertTextFormat, Range, TextEdit
 
+from armwright.program.language.error_kinds import KINDS
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.position_codec import PositionCodec
@@ -64,6 +65,7 @@ _WORD_SNIPPETS = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
     "FORCE": "FORCE ${1:ARM_1}",
+    "RAISE": "RAISE ${1:kind} WITH ${2:text}",
     "PULSE": "PULSE ${1:device} FOR ${2:0.5s}",
     "LOG": 'LOG "${1:name}" (${2:value})',
 }
@@ -119,7 +121,7 @@ _NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
 _CONDITION = _OperandRule(kinds=frozenset((VariableKind.SCALAR, VariableKind.BOOLEAN)), functions=_NUMBERS)
 _TESTS = tuple(name for name, signature in FUNCTIONS.items() if signature.result is ExpressionType.CONDITION)
 _CONDITION = attrs.evolve(_CONDITION, functions=(*_NUMBERS, *_TESTS), values=("PI", "TIME", *_TRUTHS), words=("NOT",))
-_TEXT = _OperandRule(kinds=frozenset((VariableKind.TEXT,)), functions=("TEXT",))
+_TEXT = _OperandRule(kinds=frozenset((VariableKind.TEXT,)), functions=("TEXT",), values=("MESSAGE",))
 _POSE = _OperandRule(kinds=_FRAME, arms=True)
 _TRANS = _OperandRule(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
 _STEP = _OperandRule(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
@@ -147,6 +149,7 @@ _RULES_BY_NAME: Mapping[str, _OperandRule] = {
     "an arm such as ARM_1": _OperandRule(arms=True),
     "a sensor": _OperandRule(words=SENSORS),
     "a unit": _OperandRule(words=DECLARABLE),
+    "a kind of error": _OperandRule(words=tuple(KINDS)),
 }
 # What functions take.
 _ARGUMENT_RULES: Mapping[str, _OperandRule] = {

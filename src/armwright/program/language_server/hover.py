@@ -8,6 +8,7 @@ from lsprotocol import types as lsp
 
 from armwright.arrays import Array
 from armwright.cell.model import base_name
+from armwright.program.language.error_kinds import KINDS
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.units import UNITS, UnitSystem, convert, dimension
@@ -107,6 +108,9 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = text, [_describe_device(analysis, key)]
         case NameKind.UNIT if key in UNITS:
             description = key, [f"a unit of {dimension(key)}"]
+        case NameKind.ERROR:
+            own = "a kind of error of the program, which RAISE raises and RECOVER may name"
+            description = text, [f"a kind of error: {KINDS[key]}" if key in KINDS else own]
         case NameKind.AXIS:
             description = key, [f"the {key.lower()} axis"]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:

@@ -22,7 +22,7 @@ _MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY] [VIA (poses)] [WITH ... = ..
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
 _COBEGIN = "COBEGIN [PRIORITY number :] BEGIN ... END ; BEGIN ... END COEND"
-_TRY = "TRY statements RECOVER statements END"
+_TRY = "TRY statements RECOVER [(kinds)] statements END"
 _AFFIX = "AFFIX frame TO frame [AT transformation] [RIGIDLY | NONRIGIDLY]"
 _ARRAY = "name : ARRAY [sizes] OF type"
 
@@ -135,7 +135,14 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "LOCK": ("LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."),
     # recovery
     "TRY": (_TRY, "Runs statements; when one of them fails, those after RECOVER run instead of the rest."),
-    "RECOVER": (_TRY, "Precedes the statements that run when a statement after TRY fails."),
+    "RECOVER": (
+        _TRY,
+        "Precedes the statements that run when a statement after TRY fails, with an error of these kinds.",
+    ),
+    "RAISE": (
+        "RAISE kind [WITH text]",
+        "Fails with an error of the program's own, from which a TRY around it recovers.",
+    ),
     "RETRY": ("RETRY", "Inside RECOVER: runs the statements after TRY again."),
     # functions
     "XYZ": ("XYZ (x, y, z)", "A TRANS: a translation without a rotation, in the length unit of the program."),
@@ -170,6 +177,7 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "MAX": ("MAX (a, b, ...)", "The largest of the numbers."),
     # values
     "PI": ("PI", "The number 3.14159..."),
+    "MESSAGE": ("MESSAGE", "The text of the error that this process has recovered from last."),
     "TRUE": ("TRUE", "The condition that holds."),
     "FALSE": ("FALSE", "The condition that does not hold."),
     "TIME": ("TIME", "The time on the clock of the cell since the program began, in seconds."),

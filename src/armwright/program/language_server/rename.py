@@ -19,6 +19,7 @@ _NOT_RENAMEABLE = {
     NameKind.UNIT: "a unit",
     NameKind.SENSOR: "a reserved word",
     NameKind.AXIS: "an axis",
+    NameKind.ERROR: "a kind of error",
 }
 
 
@@ -130,5 +131,5 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
-    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE)
+    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE, NameKind.ERROR)
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

@@ -43,6 +43,7 @@ _NAME_STYLES = {
     NameKind.DEVICE: ("property", 0),
     NameKind.UNIT: ("type", _BIT["defaultLibrary"]),
     NameKind.SENSOR: ("keyword", 0),
+    NameKind.ERROR: ("enumMember", 0),
     NameKind.AXIS: ("enumMember", _BIT["readonly"]),
     NameKind.VALUE: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["scalar"]),
 }

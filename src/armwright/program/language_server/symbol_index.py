@@ -32,6 +32,7 @@ class NameKind(enum.Enum):
     SENSOR = "sensor"
     AXIS = "axis"
     VALUE = "value of the language"
+    ERROR = "kind of error"
     UNKNOWN = "unknown name"
 
 
@@ -105,7 +106,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
         scopes: the names that are visible in each range of the text.
     """
     result: list[Occurrence] = []
-    in_units = in_read = False
+    in_units = in_read = in_recover = False
     previous = ""
     for index, token in enumerate(tokens):
         kind, key = token.kind, token.key
@@ -116,7 +117,9 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
             else:
                 name = _classify_name(token, scopes.scope_at(token.start), previous, next_key, in_units=in_units)
             result.append(name)
-            if (in_read and previous in ("(", ",")) or previous == "FOR":
+            if previous == "RAISE" or (in_recover and previous in ("(", ",")):
+                name.kind, name.owner, name.type, name.declares = NameKind.ERROR, None, None, False
+            elif (in_read and previous in ("(", ",")) or previous == "FOR":
                 name.writes = True
             elif previous in STATEMENT_OPENERS or not previous:
                 name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
@@ -126,6 +129,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
                 name.kind, name.owner, name.type = NameKind.DEVICE, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
+            in_recover = key == "RECOVER"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
         previous = key
     return tuple(result)

@@ -42,5 +42,6 @@ def check(
                 functions.check_function(names, procedure)
     Context(CHECKS, names, calls).check(*program.statements)
     calls.report_fixed_arguments()
+    control_flow.report_unknown_kinds(names)
     names.report_unused()
     return names.symbols, names.diagnostics, tuple(names.imports)

@@ -1,5 +1,7 @@
 """Conditionals, loops, concurrent branches, events, locks, recovery and calls."""
 
+from armwright.program.language.diagnostic import did_you_mean
+from armwright.program.language.error_kinds import KINDS
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
 from armwright.program.semantics.expression_types import (
@@ -9,6 +11,7 @@ from armwright.program.semantics.expression_types import (
     variable_phrase,
 )
 from armwright.program.semantics.quantities import check_range, check_unit
+from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.type_check import (
     check_any,
     report_constant_assignment,
@@ -102,6 +105,7 @@ def lock(context: Context, node: tree.Lock) -> None:
 
 def try_(context: Context, node: tree.Try) -> None:
     """Check both parts. An error in a RECOVER part goes outward: a TRY inside of it has a RECOVER of its own."""
+    context.names.recovered += [kind for kind in node.kinds if isinstance(kind, tree.Name)]
     context.check_with(*node.body, recovering=False)
     context.check_with(*node.recovery, recovering=True)
 
@@ -112,6 +116,29 @@ def retry(context: Context, node: tree.Retry) -> None:
         text, advice = "RETRY is outside of RECOVER", "write `TRY ... RECOVER ... RETRY END`"
         note = "RETRY repeats the TRY of the RECOVER that contains it"
         context.names.report("E225", text, node.span, "retry what?", note=note, advice=advice)
+
+
+def raise_(context: Context, node: tree.Raise) -> None:
+    """Check kind and text of a RAISE."""
+    names, kind = context.names, node.kind
+    if kind.key in KINDS:
+        text, note = f"`{kind.text}` is a kind of errors of the language", f"it stands for: {KINDS[kind.key]}"
+        advice = "give the errors of the program a name of their own"
+        names.report("E236", text, kind.span, "not a kind of its own", note=note, advice=advice)
+    names.raised.add(kind.key)
+    if node.text is not None:
+        require_type(names, node.text, ExpressionType.TEXT, "E217", "RAISE ... WITH needs a text")
+
+
+def report_unknown_kinds(names: NameResolver) -> None:
+    """Report kinds of errors that a RECOVER names and that nothing can be."""
+    for kind in names.recovered:
+        if kind.key not in KINDS and kind.key not in names.raised:
+            near = names.closest_name(kind.text, lambda: [*KINDS, *names.raised])
+            advice = did_you_mean(near) or f"write `RAISE {kind.text}` where it occurs"
+            note = f"kinds of the language are {', '.join(KINDS)}"
+            text = f"no error is of the kind `{kind.text}`"
+            names.report("E236", text, kind.span, "nothing raises it", note=note, advice=advice)
 
 
 def return_(context: Context, node: tree.Return) -> None:
@@ -146,6 +173,7 @@ CHECKS: Checks = {
     tree.Try: try_,
     tree.Retry: retry,
     tree.Halt: lambda *_: None,
+    tree.Raise: raise_,
     tree.Return: return_,
     tree.Call: lambda context, node: context.calls.check(node, context.procedure),
     tree.Poison: poison,

@@ -126,7 +126,9 @@ def _constant_type(names: NameResolver, node: tree.Constant) -> VariableType | N
         varies = isinstance(part, tree.ArmName) or (isinstance(part, tree.Function) and part.name.key in WITH_NAME)
         if isinstance(part, tree.Name) and names.scope.type(part.key) is not None:
             varies = not names.scope.is_constant(part.key)
-        if varies or (isinstance(part, tree.Name) and part.key == "TIME" and names.scope.is_value(part.key)):
+        if varies or (
+            isinstance(part, tree.Name) and part.key in ("TIME", "MESSAGE") and names.scope.is_value(part.key)
+        ):
             text, note = "the value of a constant is known before the program runs", "it may use numbers, constants"
             note += " that are declared before it, and functions of them"
             names.report("E217", text, part.span, "this is not", note=note)

@@ -29,6 +29,9 @@ class NameResolver:
         self.symbols = Symbols(types=dict(PREDECLARED), std=std)
         self.imports: list[ImportedFrames] = []
         self.cell = cell
+        # The kinds of errors that the program raises, and those that its RECOVERs name.
+        self.raised: set[str] = set()
+        self.recovered: list[tree.Name] = []
         # Of each log, in lower case, the statement that first writes it.
         self.logs: dict[str, tree.Log] = {}
         self.scope = Scope(symbols=self.symbols)

@@ -28,6 +28,13 @@ from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import pose_literals, tree
 
+# The types of values of the language; the others are numbers.
+_VALUE_TYPES = {
+    "TRUE": ExpressionType.CONDITION,
+    "FALSE": ExpressionType.CONDITION,
+    "MESSAGE": ExpressionType.TEXT,
+}
+
 
 def infer_type(names: NameResolver, node: tree.Expression) -> ExpressionType | None:
     """Return the type of an expression; None where it is unknown, the reason being reported.
@@ -204,7 +211,7 @@ def _number(_names: NameResolver, node: tree.Number) -> ExpressionType | None:
 
 def _name(names: NameResolver, node: tree.Name) -> ExpressionType | None:
     if names.scope.is_value(node.key):
-        return ExpressionType.CONDITION if node.key in ("TRUE", "FALSE") else ExpressionType.SCALAR
+        return _VALUE_TYPES.get(node.key, ExpressionType.SCALAR)
     kind = names.type(node)
     return None if kind is None else array_elements.variable_type(names, node, kind)
 

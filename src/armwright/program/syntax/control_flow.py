@@ -338,14 +338,17 @@ def lock(tokens: TokenStream) -> tree.Lock:
     return tokens.node(tree.Lock, start, head, targets, nested_statement(tokens, "DO"))
 
 
-# "TRY" statements "RECOVER" statements "END"
+# "TRY" statements "RECOVER" [ "(" name { "," name } ")" ] statements "END"
 def try_(tokens: TokenStream) -> tree.Try:
     """Read one TRY."""
     start = tokens.take()
     body = statements(tokens, "RECOVER")
     recovery: tuple[tree.Statement, ...] = ()
+    kinds: tuple[tree.Name | tree.Poison, ...] = ()
     recover, end = expect_closer(tokens, "RECOVER", start), None
     if recover:
+        if tokens.standard is Standard.RLO_2 and tokens.matches("("):
+            kinds = _error_kinds(tokens)
         tokens.recover_depth += 1
         try:
             recovery = statements(tokens, "END")
@@ -355,7 +358,36 @@ def try_(tokens: TokenStream) -> tree.Try:
     elif tokens.matches("END") and tokens.peek().key != ".":
         tokens.take()
     gap = tokens.gap_span()
-    return tree.Try(tokens.span_since(start), body, recover or gap, recovery, end or gap)
+    return tree.Try(tokens.span_since(start), body, recover or gap, recovery, end or gap, kinds)
+
+
+def _error_kinds(tokens: TokenStream) -> tuple[tree.Name | tree.Poison, ...]:
+    """Read the kinds of errors behind RECOVER; what is none is passed over up to the end of the list."""
+    kinds = tokens.attempt(lambda tokens: parenthesised_list(tokens, _error_kind, "a kind of error", "after RECOVER"))
+    if kinds is None:
+        tokens.skip_to(")", ";", "END")
+        tokens.accept(")")
+        tokens.suppress_reports()
+    return kinds or ()
+
+
+def _error_kind(tokens: TokenStream, wants: str, where: str) -> tree.Name | tree.Poison:
+    tokens.note_expected_operand(wants, where)
+    if tokens.current.kind is TokenKind.NAME:
+        tokens.height = 1
+        return tokens.take_name()
+    return tokens.fail(f"expected {wants} {where or f'after `{tokens.previous.text}`'}")
+
+
+# "RAISE" name [ "WITH" expr ]
+def raise_(tokens: TokenStream) -> tree.Raise:
+    """Read one RAISE."""
+    start = tokens.current
+    tokens.accept_word("RAISE")
+    kind = tokens.take_name()
+    tokens.check_name_length(kind)
+    text = expression(tokens, "a text", "after WITH") if tokens.accept("WITH") else None
+    return tokens.node(tree.Raise, start, kind, text)
 
 
 # "RETRY"

@@ -44,6 +44,7 @@ _RULES: Mapping[str, Rule] = {
     "TRY": control_flow.try_,
     "RETRY": control_flow.retry,
     "HALT": control_flow.halt,
+    "RAISE": control_flow.raise_,
     "RETURN": control_flow.return_,
     "PRINT": output.print_,
     "LOG": output.log,

@@ -317,12 +317,16 @@ class Lock(Node):
 
 @attrs.frozen
 class Try(Node):
-    """``TRY statements RECOVER statements END``; ``recover`` and ``end`` are its words, or where they are missing."""
+    """``TRY statements RECOVER statements END``; ``recover`` and ``end`` are its words, or where they are missing.
+
+    It recovers from the ``kinds`` of errors behind RECOVER, or from all where there are none.
+    """
 
     body: tuple["Statement", ...]
     recover: Span
     recovery: tuple["Statement", ...]
     end: Span
+    kinds: tuple[Name | Poison, ...] = ()
 
 
 @attrs.frozen
@@ -333,6 +337,14 @@ class Retry(Node):
 @attrs.frozen
 class Halt(Node):
     """``HALT``."""
+
+
+@attrs.frozen
+class Raise(Node):
+    """``RAISE kind [WITH text]``."""
+
+    kind: Name
+    text: Expression | None = None
 
 
 @attrs.frozen
@@ -365,6 +377,7 @@ ControlStatement: TypeAlias = (
     | Try
     | Retry
     | Halt
+    | Raise
     | Return
     | Call
 )
@@ -388,7 +401,7 @@ class Log(Node):
 OutputStatement: TypeAlias = Print | Log
 
 # What a FUNCTION is made of: it works out a value, and does nothing else.
-FUNCTION_STATEMENTS = (Assign, Block, If, While, Repeat, For, Return, Poison)
+FUNCTION_STATEMENTS = (Assign, Block, If, While, Repeat, For, Raise, Return, Poison)
 
 Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | OutputStatement | Poison
 

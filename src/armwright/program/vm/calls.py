@@ -147,7 +147,20 @@ def _evaluate_function(machine: Machine, process: Process, step: Instruction) ->
     process.pc = outside
 
 
+def _raise(machine: Machine, process: Process, step: Instruction) -> None:
+    """Fail with an error of the program's own."""
+    kind = str(step.operands[0])
+    text = f"error `{machine.spelling(kind)}` is raised"
+    if len(step.operands) > 1:
+        text = str(machine.read(process, step.operands[1], step.span)) or text
+    helps = [f"write TRY and `RECOVER ({machine.spelling(kind)})` around it to go on"]
+    error = machine.error(process, "E508", text, step.span, f"raised as {machine.spelling(kind)}", helps=helps)
+    error.kind = kind
+    raise error
+
+
 CALLS: Mapping[Op, Handler] = {
+    Op.RAISE: _raise,
     Op.JMP: _jump,
     Op.JZ: _jump_if_not,
     Op.FOR: _for,

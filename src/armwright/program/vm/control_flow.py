@@ -101,7 +101,8 @@ def _pause(machine: Machine, process: Process, step: Instruction) -> None:
 
 
 def _try(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    attempt = TryBlock(process.pc - 1, jump_target(step, 0), recovering=False, lock_count=len(process.locks))
+    kinds = tuple(map(str, step.operands[1:]))
+    attempt = TryBlock(process.pc - 1, jump_target(step, 0), False, len(process.locks), kinds)
     process.activation.try_blocks.append(attempt)
 
 
@@ -205,12 +206,12 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         process.wake_tick = at_rest = max([at_rest, *ends, _stop_motion(machine, process, span)])
         abandon_wait(machine, process)
         process.pending_effect = None
-        if (try_block := _unwind_to_recovery(machine, process, span)) is not None:
-            process.pc = try_block.recovery
+        if (try_block := _unwind_to_recovery(machine, process, span, error.kind)) is not None:
+            process.pc, process.message = try_block.recovery, error.diagnostic.message
             release_locks(machine, process, try_block.lock_count)
             code, line = error.diagnostic.code, machine.code.source.line(span.start)
             text = f"{code} in line {line}: {error.diagnostic.message}"
-            machine.record_effect(process, "ERROR", text, span, data={"code": code})
+            machine.record_effect(process, "ERROR", text, span, data={"code": code, "kind": error.kind})
             return True
         if process.parent is None:
             machine.state.ticks = process.wake_tick
@@ -218,13 +219,16 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         process = process.parent
 
 
-def _unwind_to_recovery(machine: Machine, process: Process, span: Span) -> TryBlock | None:
-    """Return the innermost attempt that has not failed yet, now failed, with all activations inside it left."""
+def _unwind_to_recovery(machine: Machine, process: Process, span: Span, kind: str) -> TryBlock | None:
+    """Return the innermost attempt that recovers from a kind of error and has not failed yet, now failed.
+
+    All activations inside it are left.
+    """
     while True:
         try_blocks = process.activation.try_blocks
         while try_blocks:
             try_block = try_blocks.pop()
-            if not try_block.recovering:
+            if not try_block.recovering and (not try_block.kinds or kind in try_block.kinds):
                 try_blocks.append(attrs.evolve(try_block, recovering=True))
                 return try_block
         if len(process.stack) == 1:

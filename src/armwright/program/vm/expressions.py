@@ -83,6 +83,10 @@ def _truth(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], step.operands[1] == "TRUE", step.span)
 
 
+def _message(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], process.message, step.span)
+
+
 def _time(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], machine.now, step.span)
 
@@ -110,6 +114,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.ELEM: _element,
     Op.FORCE: _force,
     Op.TIME: _time,
+    Op.MESSAGE: _message,
     **dict.fromkeys((Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING), _signal),
     Op.TEXT: _text,
     Op.LOADB: _truth,

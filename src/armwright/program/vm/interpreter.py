@@ -199,7 +199,9 @@ def _stopped_error(machine: Machine, error: RunError, process: Process, arm: str
     switched_off = shut_down(machine, error.diagnostic.span)
     failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
     recording = partial(_failure_recording, machine, failure, switched_off)
-    return RunError(error.diagnostic, machine.state.tree, machine.now, recording)
+    stopped = RunError(error.diagnostic, machine.state.tree, machine.now, recording)
+    stopped.kind = error.kind
+    return stopped
 
 
 def _failure_recording(machine: Machine, failure: Failure, switched_off: Sequence[str]) -> Recording:

@@ -21,6 +21,7 @@ from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
+from armwright.program.vm.error_kinds import error_kind
 from armwright.program.vm.process import ElementReference, PendingEffect, Process, StartTime, Value
 from armwright.program.vm.recording import Effect, EffectKind, Recording, sample_stream, sort_effects, thin_trees
 from armwright.program.vm.state import MachineState
@@ -46,6 +47,7 @@ class RunError(ArmwrightError, RuntimeError):
         tree: the frame tree at that moment.
         time: of the cell's clock [s].
         recording: returns all that happened up to it; None before the arms are at rest.
+        kind: of the error, which a RECOVER may name: one of the language, or the program's own.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class RunError(ArmwrightError, RuntimeError):
     ) -> None:
         """Keep the circumstances; the text is the diagnostic's message."""
         self.diagnostic, self.tree, self.time, self.recording = diagnostic, tree, time, recording
+        self.kind = error_kind(diagnostic.code)
         super().__init__(diagnostic.message)
 
 

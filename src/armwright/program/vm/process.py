@@ -53,12 +53,14 @@ class TryBlock:
         recovery: of its RECOVER part.
         recovering: whether that part is running.
         lock_count: how many locks the process held when it began.
+        kinds: of the errors that it recovers from; empty for all.
     """
 
     start: int
     recovery: int
     recovering: bool
     lock_count: int
+    kinds: tuple[str, ...] = ()
 
 
 @attrs.define
@@ -291,6 +293,7 @@ class Process:
         locks: the variables it has locked, in the order of taking.
         branches: processes begun and not yet joined.
         done: whether it has ended.
+        message: of the error that it recovered from last.
     """
 
     path: tuple[int, ...] = ()
@@ -307,6 +310,7 @@ class Process:
     locks: list[str] = attrs.field(factory=list)
     branches: list[Process] = attrs.field(factory=list)
     done: bool = False
+    message: str = ""
 
     @property
     def activation(self) -> Activation:
