@@ -35,6 +35,7 @@ COMMANDS = {
     "calibrate": "Identify the geometric errors of an arm from measured points of its tool, and write the corrected arm.",
     "calibrate-camera": "Calibrate a camera from pictures of a board: its lens, and its pose on an arm or beside it.",
     "plan-poses": "Propose measurement configurations at which the errors of an arm are most observable.",
+    "plan-excitation": "Plan a motion from which masses, inertias and friction of an arm can be identified.",
     "identify": "Identify masses, inertias and friction of an arm from logs of its motions.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",

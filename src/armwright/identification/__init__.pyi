@@ -1,3 +1,4 @@
+from .excitation import Excitation as Excitation, MotionLimits as MotionLimits, plan_excitation as plan_excitation
 from .feasible import Standard as Standard, arm_of as arm_of, feasible as feasible
 from .fitting import Fit as Fit, ordinary as ordinary, robust as robust, summed as summed, weighted as weighted
 from .gains import Gains as Gains, drive_gains as drive_gains

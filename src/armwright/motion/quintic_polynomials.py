@@ -1,4 +1,4 @@
-"""Point to point: the quintic that rests at both ends."""
+"""Quintics: point to point at rest at both ends, and through samples."""
 
 from __future__ import annotations
 
@@ -45,6 +45,35 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
     coefficients = powers[:, None] * displacement
     coefficients[0] += start
     return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
+
+
+def hermite(times: Array, q: Array, qd: Array, qdd: Array) -> Trajectory:
+    """Return the motion through samples whose positions, velocities and accelerations are all continuous.
+
+    Args:
+        times: (k,) [s], increasing from 0.
+        q: (k, n) joint positions [rad] or [m].
+        qd: (k, n) joint velocities.
+        qdd: (k, n) joint accelerations.
+
+    Returns:
+        A quintic between each two samples.
+    """
+    h = np.diff(times)[:, None]
+    step, fall, bend = (
+        q[1:] - q[:-1] - h * qd[:-1] - h**2 * qdd[:-1] / 2,
+        qd[1:] - qd[:-1] - h * qdd[:-1],
+        np.diff(qdd, axis=0),
+    )
+    powers = [
+        q[:-1],
+        qd[:-1],
+        qdd[:-1] / 2,
+        (10 * step - 4 * h * fall + h**2 * bend / 2) / h**3,
+        (-15 * step + 7 * h * fall - h**2 * bend) / h**4,
+        (6 * step - 3 * h * fall + h**2 * bend / 2) / h**5,
+    ]
+    return Trajectory(times=times, coefficients=np.stack(powers, axis=1))
 
 
 def shortest_duration(arm: Arm, displacement: ArrayLike) -> float:

@@ -51,6 +51,11 @@ class ConfigurationChecks:
         self._boxes = np.array([box for box, _ in boxes]).reshape(-1, 3)
         self._around = np.array([around for _, around in boxes])
 
+    @property
+    def pair_count(self) -> int:
+        """The number of pairs that may not meet."""
+        return len(self._pairs)
+
     def first_meeting(self, configurations: Mapping[str, Array], margins: Array) -> Meeting | None:
         """Return the first of several configurations at which bodies are closer than they may be; None for none.
 
