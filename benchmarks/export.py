@@ -9,7 +9,7 @@ from measure import progress, section, table
 
 from armwright.export.api import export_run
 from armwright.export.plan_mode import plan_statements
-from armwright.export.writers import drive_csv, krl, rapid, ros2, urscript
+from armwright.export.writers import drive_csv, fanuc, krl, rapid, ros2, urscript
 from armwright.program import Recording, Source, run
 
 ROOT = Path(__file__).parents[1]
@@ -20,8 +20,9 @@ CELLS = {
     "urscript": ROOT / "examples" / "ur5_cell.toml",
     "krl": ARMS / "kr6r900_cell.toml",
     "rapid": ARMS / "irb120_cell.toml",
+    "fanuc": ARMS / "lrmate200id_cell.toml",
 }
-LANGUAGES = {"urscript": urscript, "krl": krl, "rapid": rapid}
+LANGUAGES = {"urscript": urscript, "krl": krl, "rapid": rapid, "fanuc": fanuc}
 # 500 point-to-point moves and 500 straight lines.
 PROGRAM = """
 VAR a, b : FRAME ; n : SCALAR ;

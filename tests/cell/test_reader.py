@@ -265,13 +265,13 @@ FAULTS = {
     "unknown model": (
         '[arms.ARM_1]\nmodel = "pumma560"\n',
         2,
-        "arms, ARM_1, model: no arm 'pumma560'. Did you mean 'puma560'? Known: ",
+        "arms, ARM_1, model: no arm 'pumma560'. Did you mean 'puma560'? All ",
     ),
     "missing arm file": ('[arms.ARM_1]\nmodel = "no/arm.toml"\n', 2, r"no/arm.toml: no such file"),
     "model without an inverse": (
         '[arms.ARM_1]\nmodel = "ntu-3r"\n',
         2,
-        "arms, ARM_1, model: 'ntu-3r' has 3 joints; moves specify position and orientation",
+        "arms, ARM_1, model: 'ntu-3r' has 3 joints; an arm in a cell needs four or more",
     ),
     "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; specify the initial pose of the gripper, or the jo"),
     "two starts": (

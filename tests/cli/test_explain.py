@@ -101,10 +101,10 @@ def test_json() -> None:
 
 def test_unknown_code() -> None:
     """A code that does not exist ends with the nearest and status 2."""
-    result = explain("E232")
+    result = explain("E292")
 
     assert result.returncode == 2
-    assert result.stderr.startswith("armwright: no code 'E232'. Did you mean 'E202'? Known: E201,")
+    assert result.stderr.startswith("armwright: no code 'E292'. Did you mean 'E202'? Known: E201,")
 
 
 def test_help() -> None:

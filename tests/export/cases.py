@@ -11,6 +11,8 @@ from armwright import Arm, load_arm
 from armwright.arm.model import Joint, Limits
 from armwright.arrays import Array
 from armwright.export.conventions import ControllerArm, controller_arm, conventions
+from armwright.export.plan_mode import plan_statements
+from armwright.export.statements import ControllerProgram
 from armwright.program import Recording, Source, run
 
 HERE = Path(__file__).parent
@@ -21,8 +23,14 @@ CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",
     "krl": HERE / "arms" / "kr6r900_cell.toml",
     "rapid": HERE / "arms" / "irb120_cell.toml",
+    "fanuc": HERE / "arms" / "lrmate200id_cell.toml",
 }
-ARMS = {"urscript": ("ur5", "universal-robots"), "krl": ("kr6r900", "kuka"), "rapid": ("irb120", "abb")}
+ARMS = {
+    "urscript": ("ur5", "universal-robots"),
+    "krl": ("kr6r900", "kuka"),
+    "rapid": ("irb120", "abb"),
+    "fanuc": ("lrmate200id", "fanuc"),
+}
 
 
 @cache
@@ -38,6 +46,11 @@ def recorded(program: str, target: str) -> Recording:
     """Return the run of an example, or of a text, in the cell of a target."""
     text = EXAMPLES / program if program.endswith(".rlo") else Source("test.rlo", program)
     return run(text, CELLS[target])
+
+
+def planned(program: str, target: str) -> ControllerProgram:
+    """Return the plan of an example, or of a text, in the cell of a target, as that is exported."""
+    return plan_statements(recorded(program, target), "x", zones=target != "fanuc")
 
 
 def six_axes(rows: list[tuple[float, float, float, float]], name: str) -> Arm:

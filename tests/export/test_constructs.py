@@ -91,7 +91,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], R
 def test_the_table_is_whole() -> None:
     """Every construct of the table has a program, and no other has; every target has a column."""
     assert set(TABLE) == {*PROGRAMS, DETOUR}
-    assert TARGETS == ["urscript", "krl", "rapid", "ros2", "csv"]
+    assert TARGETS == ["urscript", "krl", "rapid", "fanuc", "ros2", "csv"]
 
 
 @pytest.mark.parametrize("construct", PROGRAMS)

@@ -172,7 +172,7 @@ def test_coupling_of_fanuc() -> None:
     assert np.degrees(mapped.joints(own)[2]) == pytest.approx(case["shown_3"], abs=1e-3)
 
 
-@pytest.mark.parametrize("target", ["urscript", "krl", "rapid"])
+@pytest.mark.parametrize("target", ["urscript", "krl", "rapid", "fanuc"])
 def test_joints_there_and_back(target: str) -> None:
     """The checker's joints of the controller's joints are those of the arm."""
     mapped = mapped_arm(target)

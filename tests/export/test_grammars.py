@@ -8,7 +8,7 @@ from armwright.export.checkers.actions import CheckError
 from armwright.export.checkers.grammar import parse
 
 PROGRAMS = Path(__file__).parent / "programs"
-LANGUAGES = {".src": "krl", ".sys": "rapid", ".mod": "rapid", ".script": "urscript"}
+LANGUAGES = {".src": "krl", ".sys": "rapid", ".mod": "rapid", ".script": "urscript", ".ls": "fanuc"}
 
 
 @pytest.mark.parametrize("path", sorted(PROGRAMS.iterdir()), ids=lambda path: path.name)
@@ -28,6 +28,8 @@ def test_real_programs_are_read(path: Path) -> None:
         ("krl", "DEF a( )\nIF x THEN\nEND\n", 3),
         ("rapid", "MODULE a\n  PROC main()\n    MoveL p1,v100 fine,tool0;\n  ENDPROC\nENDMODULE\n", 3),
         ("rapid", "MODULE a\n  PROC main()\n  ENDMODULE\n", 3),
+        ("fanuc", "/PROG A\n/ATTR\n/MN\n   1:J P[1] FINE ;\n/POS\n/END\n", 4),
+        ("fanuc", "/PROG A\n/ATTR\n/MN\n   1:  DO[1]=ON\n/POS\n/END\n", 4),
     ],
 )
 def test_slips_are_found(language: str, text: str, line: int) -> None:

@@ -8,21 +8,27 @@ import numpy as np
 import pytest
 
 from armwright.export import export_run
-from armwright.export.checkers import krl as krl_checker, rapid as rapid_checker, urscript as urscript_checker
+from armwright.export.checkers import (
+    fanuc as fanuc_checker,
+    krl as krl_checker,
+    rapid as rapid_checker,
+    urscript as urscript_checker,
+)
 from armwright.export.checkers.comparison import _Model, compare
 from armwright.export.checkers.orientations import angle_apart
 from armwright.export.checkers.posture import PostureReader
 from armwright.export.plan_mode import plan_statements
 from armwright.export.statements import MoveJoints, MoveKnots, MoveLines
-from armwright.export.writers import krl, rapid, urscript
+from armwright.export.writers import fanuc, krl, rapid, urscript
 from armwright.kinematics import forward
 from armwright.program import Recording, Source, run
-from export.cases import CELLS, EXAMPLES, mapped_arm, random_joints, recorded
+from export.cases import CELLS, EXAMPLES, mapped_arm, planned, random_joints, recorded
 
 LANGUAGES = {
     "urscript": (urscript, urscript_checker),
     "krl": (krl, krl_checker),
     "rapid": (rapid, rapid_checker),
+    "fanuc": (fanuc, fanuc_checker),
 }
 PLACE, ANGLE = 1e-6, 1e-5  # what is allowed [m], [rad]
 
@@ -35,7 +41,7 @@ def export(target: str, recording: Recording) -> dict[str, float]:
 @pytest.mark.parametrize("target", LANGUAGES)
 def test_the_twelve_forms_of_move(target: str) -> None:
     """All forms of MOVE come back within a micrometre and 10 µrad, the digits of the files being much finer."""
-    plan = plan_statements(recorded("twelve_moves.rlo", target), "twelve")
+    plan = planned("twelve_moves.rlo", target)
     kinds = [type(statement) for statement in plan.statements]
     assert (kinds.count(MoveJoints), kinds.count(MoveLines), kinds.count(MoveKnots)) == (6, 10, 4)
 
@@ -117,7 +123,7 @@ def test_random_targets(target: str, sample: Any) -> None:
         actions = checker.read(writer.write(attrs.evolve(plan, statements=tuple(statements))).text).actions[1:]
         for i, action in enumerate(actions):
             if i % 2:
-                Y = mapped.X_BC @ action.X
+                Y = forward(mapped.arm, model.joints(action.q)) if action.X is None else mapped.X_BC @ action.X
                 words = reader.words(mapped.joints(q[i]))
                 assert all(value in words[word] for word, value in action.configuration.items()), q[i].tolist()
             else:

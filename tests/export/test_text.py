@@ -6,12 +6,17 @@ from typing import Any
 import attrs
 import pytest
 
-from armwright.export.checkers import krl as krl_checker, rapid as rapid_checker, urscript as urscript_checker
+from armwright.export.checkers import (
+    fanuc as fanuc_checker,
+    krl as krl_checker,
+    rapid as rapid_checker,
+    urscript as urscript_checker,
+)
 from armwright.export.checkers.actions import TextAction
 from armwright.export.plan_mode import plan_statements
 from armwright.export.statements import Say
-from armwright.export.writers import krl, rapid, urscript
-from armwright.export.writers.reserved_words import KRL, RAPID, URSCRIPT
+from armwright.export.writers import fanuc, krl, rapid, urscript
+from armwright.export.writers.reserved_words import FANUC, KRL, RAPID, URSCRIPT
 from armwright.export.writers.text import decimal, identifier, plain_lines
 from export.cases import recorded
 
@@ -19,6 +24,7 @@ LANGUAGES = {
     "urscript": (urscript, urscript_checker, 64, URSCRIPT),
     "krl": (krl, krl_checker, 24, KRL),
     "rapid": (rapid, rapid_checker, 32, RAPID),
+    "fanuc": (fanuc, fanuc_checker, 8, FANUC),
 }
 HOSTILE = "\"'\\;!#&$%{}[]()\n\r\t\0\u2028\U0001f916äß\x7f\x1b END ENDPROC end def a b 0 1 _ .. /"
 

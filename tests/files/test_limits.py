@@ -336,6 +336,7 @@ def test_every_file_is_read_in_one_place() -> None:
         "files/output.py",
         "report/movie.py",
         "report/ros2_log.py",
+        "export/",
         "report/markup.py",
         "program/diagnostics/index.py",
         "sweep/folder.py",

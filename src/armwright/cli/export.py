@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def export(  # noqa: PLR0917 - Typer reads one parameter per option
     target: Annotated[
         Target,
-        Argument(help="Controller: ros2 (JointTrajectory), csv (counts of drives), urscript, krl or rapid."),
+        Argument(help="Controller: ros2 (JointTrajectory), csv (counts of drives), urscript, krl, rapid or fanuc."),
     ],
     program: ProgramFile,
     cell: CellFile = None,

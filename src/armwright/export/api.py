@@ -10,7 +10,12 @@ import attrs
 
 from armwright.cell.model import Cell
 from armwright.errors import CheckFailedError, InvalidValueError, one_of
-from armwright.export.checkers import krl as krl_checker, rapid as rapid_checker, urscript as urscript_checker
+from armwright.export.checkers import (
+    fanuc as fanuc_checker,
+    krl as krl_checker,
+    rapid as rapid_checker,
+    urscript as urscript_checker,
+)
 from armwright.export.checkers.actions import CheckError
 from armwright.export.checkers.comparison import compare
 from armwright.export.checkers.joint_tables import compare_counts, compare_trajectory
@@ -19,7 +24,7 @@ from armwright.export.events import events_file
 from armwright.export.plan_mode import fixed_notes, plan_statements, refuse_guards
 from armwright.export.proof import Comparison, Proof
 from armwright.export.targets import Target
-from armwright.export.writers import drive_csv, krl, rapid, ros2, urscript
+from armwright.export.writers import drive_csv, fanuc, krl, rapid, ros2, urscript
 from armwright.program.api import Compilation, run
 from armwright.program.language.source import Source
 from armwright.program.vm.recording import Recording
@@ -28,7 +33,10 @@ _LANGUAGES: Mapping[Target, tuple[ModuleType, ModuleType]] = {
     "urscript": (urscript, urscript_checker),
     "krl": (krl, krl_checker),
     "rapid": (rapid, rapid_checker),
+    "fanuc": (fanuc, fanuc_checker),
 }
+# Languages that do not say in lengths how corners are rounded.
+_WITHOUT_ZONES = ("fanuc",)
 
 
 @attrs.frozen(kw_only=True)
@@ -52,7 +60,7 @@ def export_program(
     """Run a program in its cell, and return the resulting motion for a controller.
 
     Args:
-        target: ``ros2``, ``csv``, ``urscript``, ``krl`` or ``rapid``.
+        target: ``ros2``, ``csv``, ``urscript``, ``krl``, ``rapid`` or ``fanuc``.
         program: the path of its file, its text as a ``Source``, or a compiled program.
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         name: of the exported program; that of the file without one.
@@ -80,7 +88,7 @@ def export_run(target: Target, recording: Recording, name: str) -> ExportedProgr
     """Return the motion of a run for a controller; see ``export_program``.
 
     Args:
-        target: ``ros2``, ``csv``, ``urscript``, ``krl`` or ``rapid``.
+        target: ``ros2``, ``csv``, ``urscript``, ``krl``, ``rapid`` or ``fanuc``.
         recording: a run that came to its end.
         name: of the exported program.
     """
@@ -102,7 +110,7 @@ def export_run(target: Target, recording: Recording, name: str) -> ExportedProgr
 def _language(target: Target, recording: Recording, name: str) -> tuple[dict[str, str], Proof]:
     """Return the file of a target that has a language, with its proof."""
     writer, checker = _LANGUAGES[target]
-    program = plan_statements(recording, name)
+    program = plan_statements(recording, name, zones=target not in _WITHOUT_ZONES)
     written = writer.write(program)
     proof = Proof(
         target=target,

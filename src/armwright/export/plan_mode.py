@@ -41,12 +41,14 @@ _SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "END")
 _Event: TypeAlias = tuple[float, float, Effect, tuple[RunStage, ...]]
 
 
-def plan_statements(recording: Recording, name: str) -> ControllerProgram:
+def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> ControllerProgram:
     """Return what the controller of the arm that a program moved is to do.
 
     Args:
         recording: a run that came to its end.
         name: of the program, as its file is called.
+        zones: whether the language of the controller says from where on a corner is rounded; without that, a path with
+            rounded corners is given by joint positions along it.
 
     Raises:
         ExportError: the run has what a controller cannot repeat without it: a guarded MOVE, branches that work at the
@@ -61,7 +63,9 @@ def plan_statements(recording: Recording, name: str) -> ControllerProgram:
     statements: list[Statement] = []
     for _, _, effect, stages in _events(recording):
         if effect.kind == "MOVE":
-            statements += [statement for stage in stages for statement in _motion(stage, recording, solver)]
+            statements += [
+                statement for stage in stages for statement in _motion(stage, recording, solver, zones=zones)
+            ]
         elif effect.kind in _SWITCHING:
             statements += _switching(effect, recording)
         elif effect.kind == "PAUSE":
@@ -218,7 +222,7 @@ def _subject(device: str, effect: Effect) -> str:
 # ---- motions -------------------------------------------------------------------------------------------------------
 
 
-def _motion(stage: RunStage, recording: Recording, solver: Solver) -> list[Statement]:
+def _motion(stage: RunStage, recording: Recording, solver: Solver, *, zones: bool) -> list[Statement]:
     """Return the statements of one stage of a MOVE."""
     motion, span, planned = stage.motion, stage.span, stage.stage
     if not motion.duration:
@@ -229,7 +233,8 @@ def _motion(stage: RunStage, recording: Recording, solver: Solver) -> list[State
     if planned.kind == "PTP" and stage.path is None:
         part = _speed_part(stage, solver)
         return [MoveJoints(span=span, stage=stage, q=end, duration=motion.duration, speed_part=part)]
-    if planned.kind in ("LINE", "BLEND") and planned.detour is None and planned.goal is not None:
+    straight = ("LINE", "BLEND") if zones else ("LINE",)
+    if planned.kind in straight and planned.detour is None and planned.goal is not None:
         return [_lines(stage, planned.goal.poses, planned.goal.blend, solver)]
     times = path_knots(motion, solver, recording.cell.deviation)
     part = _speed_part(stage, solver)

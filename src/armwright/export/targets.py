@@ -2,4 +2,4 @@
 
 from typing import Literal, TypeAlias
 
-Target: TypeAlias = Literal["ros2", "csv", "urscript", "krl", "rapid"]
+Target: TypeAlias = Literal["ros2", "csv", "urscript", "krl", "rapid", "fanuc"]

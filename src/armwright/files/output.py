@@ -37,7 +37,7 @@ _RESULT_NAMES = re.compile(
     r"report\.html|arm\.(toml|urdf)|(log|bag)\.mcap|metadata\.yaml|calibration\.conf|kinematics\.yaml|camera\.toml|move\.(gif|mp4)|"
     r"(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|verification|bearings|error|"
     r"spectrum|forces|energy)\.svg|seen-\d+\.png|ARM_\d+\.(csv|trajectory\.yaml|goal\.yaml)|(events|proof)\.json|"
-    r"[A-Za-z]\w*\.(script|src|mod)"
+    r"[A-Za-z]\w*\.(script|src|mod|ls)"
 )
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20

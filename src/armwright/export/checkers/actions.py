@@ -19,6 +19,7 @@ class JointAction:
         speed_part: part of the axis speeds of the controller, 1 for all; None where it is not said.
         passes: whether the next motion may begin before the end.
         streamed: whether it is one sample of a stream.
+        rounding: by how much the duration may be rounded up, for the digits of the language [s].
     """
 
     line: int
@@ -27,6 +28,7 @@ class JointAction:
     speed_part: float | None = None
     passes: bool = False
     streamed: bool = False
+    rounding: float = 0.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -35,21 +37,25 @@ class LineAction:
 
     Attributes:
         line: of the file.
-        X: (4, 4) tool at the end, seen from the base frame of the controller.
+        X: (4, 4) tool at the end, seen from the base frame of the controller; None where joint positions are given.
+        q: (n,) joint positions at the end as the controller counts them [rad]; None where a pose is given.
         configuration: words of the controller for the posture at the end, by name; empty where it has none.
         duration: that is asked for [s]; None where a speed is.
         speed: of the tool point that is asked for [m/s].
         turn_speed: of the rotation that is asked for [rad/s]; None where the language has none.
         zone: how far from the end the next motion may begin [m].
+        rounding: by how much the duration may be rounded up, for the digits of the language [s].
     """
 
     line: int
-    X: Array
+    X: Array | None = None
+    q: Array | None = None
     configuration: Mapping[str, int] = attrs.field(factory=dict)
     duration: float | None = None
     speed: float | None = None
     turn_speed: float | None = None
     zone: float = 0.0
+    rounding: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
@@ -63,10 +69,11 @@ class OutputAction:
 
 @attrs.frozen(kw_only=True)
 class WaitAction:
-    """Nothing happens for a time [s]."""
+    """Nothing happens for a time [s], which may be rounded up by some of it."""
 
     line: int
     seconds: float
+    rounding: float = 0.0
 
 
 @attrs.frozen(kw_only=True)

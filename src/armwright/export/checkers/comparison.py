@@ -10,6 +10,7 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, planning_arm
 from armwright.export.checkers.actions import (
     Action,
+    CheckError,
     JointAction,
     LineAction,
     OutputAction,
@@ -197,7 +198,7 @@ class _Comparing:
                     self.statements.add(0 if right else 1, switched.line)
             case Wait(seconds=seconds):
                 if (wait := self._next(actions, WaitAction)) is not None:
-                    self.times.add(abs(wait.seconds - seconds), wait.line)
+                    self._duration(wait.seconds, seconds, wait)
             case Say(text=text):
                 self._text(text, actions)
 
@@ -229,7 +230,7 @@ class _Comparing:
         before = self._q
         self._joints(action, q)
         if action.duration is not None:
-            self.times.add(abs(action.duration - duration), action.line)
+            self._duration(action.duration, duration, action)
             part = np.abs(self._q - before) / max(action.duration, np.finfo(float).tiny) / self._model.limits
             self.speeds.add(float(part.max()), action.line)
         elif action.speed_part is not None:
@@ -256,14 +257,16 @@ class _Comparing:
             action = self._next(actions, LineAction)
             if action is None:
                 return
-            X = self._program.mapped.X_BC @ action.X
+            X = self._end(action)
             self._poses(X, pose, action.line)
             begin, path = self._model.pose(self._q[None])[0], self._model.follow(self._q, X)
+            if action.q is not None:
+                self.joints.add(float(np.abs(path[-1] - self._model.joints(action.q)).max()), action.line)
             self._speed(path, action, begin, X)
             self._q = path[-1]
             self._configuration(action)
             if action.duration is not None:
-                self.times.add(abs(action.duration - statement.duration), action.line)
+                self._duration(action.duration, statement.duration, action)
             corners.append(X[:3, 3])
             zones.append(action.zone)
             line = action.line
@@ -278,6 +281,19 @@ class _Comparing:
         far = float(_distances(points, np.array(corners)).max())
         allowed = (statement.stage.stage.deviation or 0.0) + max(zones) + _PLACE_MM * 1e-3
         self.straightness.add(far / allowed, line)
+
+    def _end(self, action: LineAction) -> Array:
+        """Return the pose (4, 4) of the tool at the end of a line, seen from the base of the arm."""
+        if action.q is not None:
+            return self._model.pose(self._model.joints(action.q)[None])[0]
+        if action.X is None:
+            raise CheckError(f"line {action.line}: a straight line without an end")
+        return np.asarray(self._program.mapped.X_BC @ action.X)
+
+    def _duration(self, found: float, planned: float, action: JointAction | LineAction | WaitAction) -> None:
+        """Compare a time with that of the plan, from which it may be rounded up."""
+        late = found - planned
+        self.times.add(max(-late, late - action.rounding, 0.0), action.line)
 
     def _configuration(self, action: LineAction) -> None:
         """Compare the configuration words of the file with the joints that its lines have led to."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import attrs
 
 from armwright.export.statements import ControllerProgram, MoveJoints, MoveLines, Say
-from armwright.export.writers.text import plain_lines
+from armwright.export.writers.text import LINE_OF_TEXT, plain_lines
 from armwright.version import __version__
 
 
@@ -31,17 +31,18 @@ def heading(program: ControllerProgram) -> str:
     return f"armwright {__version__}, plan mode, program sha256 {digest}, {len(program.statements)} statements"
 
 
-def common_approximations(program: ControllerProgram, replaced: str) -> Iterator[str]:
+def common_approximations(program: ControllerProgram, replaced: str, longest: int = LINE_OF_TEXT) -> Iterator[str]:
     """Give in words what differs from the plan on every controller.
 
     Args:
         program: what was written.
         replaced: characters that the language cannot hold in texts, beside those that no controller shows.
+        longest: of the lines of a text.
     """
     statements = program.statements
     if any(isinstance(one, MoveJoints | MoveLines) for one in statements):
         yield "speeds within a motion: the controller has its own profile for the time or the speed of the plan"
     if any(isinstance(one, MoveLines) and len(one.poses) > 1 for one in statements):
         yield "shape of rounded corners: that of the controller, begun no farther from a corner than in the plan"
-    if any(isinstance(one, Say) and plain_lines(one.text, replaced) != [one.text] for one in statements):
+    if any(isinstance(one, Say) and plain_lines(one.text, replaced, longest) != [one.text] for one in statements):
         yield "characters that the controller cannot show are shown as ? or ', and longer texts in several lines"

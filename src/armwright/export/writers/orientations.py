@@ -5,7 +5,7 @@ import math
 from armwright.arrays import Array
 
 # Below this part of a unit vector, a component says nothing about an angle.
-_NOTHING = 1e-10
+_NOTHING = 1e-12
 
 
 def quaternion(R: Array) -> tuple[float, float, float, float]:
@@ -56,5 +56,7 @@ def zyx_angles(R: Array) -> tuple[float, float, float]:
     if level < _NOTHING:
         a, c = math.atan2(-m[0][1], m[1][1]), 0.0
     else:
-        a, c = math.atan2(m[1][0], m[0][0]), math.atan2(m[2][1], m[2][2])
+        a = math.atan2(m[1][0], m[0][0])
+        # Of what is left without the first turn, whose rounding near a quarter turn the third then makes good.
+        c = math.atan2(math.sin(a) * m[0][2] - math.cos(a) * m[1][2], math.cos(a) * m[1][1] - math.sin(a) * m[0][1])
     return math.degrees(a), math.degrees(b), math.degrees(c)

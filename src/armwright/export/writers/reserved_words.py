@@ -18,4 +18,8 @@ endtest endtrap endwhile error exit false for from func goto if inout load0 loca
 nostepin not noview or pers proc raise readonly record retry return setdo step sysmodule test then to tool0 tool_1
 tpwrite trap true trynext undo var viewonly waittime while with wobj0 xor
 """
-URSCRIPT, KRL, RAPID = frozenset(_URSCRIPT.split()), frozenset(_KRL.split()), frozenset(_RAPID.split())
+_FANUC = """
+abort and call cnt do div else end endfor endif fine for if jmp lbl message mod off on or override pause pulse run
+select then timeout timer to uframe utool wait
+"""
+URSCRIPT, KRL, RAPID, FANUC = (frozenset(words.split()) for words in (_URSCRIPT, _KRL, _RAPID, _FANUC))

@@ -38,14 +38,15 @@ def decimals(values: Iterable[float], digits: int) -> list[str]:
     return [decimal(value, digits) for value in values]
 
 
-def plain_lines(text: str, replaced: str = "") -> list[str]:
+def plain_lines(text: str, replaced: str = "", longest: int = LINE_OF_TEXT) -> list[str]:
     """Return a text as lines of printable ASCII that operators can be shown.
 
     Args:
         text: any text.
         replaced: characters that become ' beside those that no controller shows, which become ?.
+        longest: of a line.
     """
     plain = "".join(
         "'" if character in replaced else character if " " <= character <= "~" else "?" for character in text
     )
-    return [plain[i : i + LINE_OF_TEXT] for i in range(0, max(len(plain), 1), LINE_OF_TEXT)]
+    return [plain[i : i + longest] for i in range(0, max(len(plain), 1), longest)]

@@ -25,7 +25,7 @@ _ROUNDS = 5
 _STEPS = 150
 # What a rotation by one radian is worth, in parts of the size of the arm; and where an arm of few joints cannot turn
 # the tool to a pose, so that it comes to its position at least.
-_WEIGHT, _POSITION_FIRST = 0.25, 1e-3
+_WEIGHT, _POSITION_FIRST = 0.25, 1e-4
 # A residual this small, in parts of the size of the arm, is rounding.
 _ROUNDING = 1e-15
 # A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
