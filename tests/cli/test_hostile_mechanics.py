@@ -84,7 +84,7 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
     [
         (("forward", "pumma560", "-q", Q), 2, "no arm 'pumma560'. Did you mean 'puma560'?"),
         (("show", "PUMA560"), 2, "no arm 'PUMA560'. Did you mean 'puma560'?"),
-        (("show", ""), 2, "no arm ''. Known: "),
+        (("show", ""), 2, "no arm ''. All "),
         (("singularity", "nowhere/arm.toml", "-q", Q), 4, "nowhere/arm.toml: no such file"),
         (("simulate", "/", "-q", Q), 4, "/: expected a file, got a folder"),
         (("torque", "\0.toml", "-q", Q), 4, "'\\x00.toml': no file can have this name"),

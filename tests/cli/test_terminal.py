@@ -36,8 +36,9 @@ def hidden(text: str) -> set[str]:
 def folder(tmp_path: Path) -> Path:
     """A folder with an arm, a cell, programs and tables that say hostile things."""
     quoted = json.dumps(HOSTILE).replace("\x7f", "\\u007f").replace("\\udb40\\udc41", "\\U000E0041")
-    arm = ARM.read_text(encoding="utf-8").splitlines()
-    arm = [line for line in arm if not line.startswith(("name", "title", "source"))]
+    head, document, rest = ARM.read_text(encoding="utf-8").partition("[[document]]")
+    arm = [line for line in head.splitlines() if not line.startswith(("name", "title", "source"))]
+    arm.append(document + rest)
     (tmp_path / "arm.toml").write_text("\n".join([f"name = {quoted}\ntitle = {quoted}\nsource = {quoted}", *arm]))
     program = f'BEGIN\n  PRINT "{HOSTILE.replace(chr(13), "")}" ;\n  PAUSE 1 ;\nEND.\n'
     (tmp_path / "print.rlo").write_text(program)
