@@ -22,8 +22,10 @@ QUANTITIES = (
     "solids",
     "hand",
 )
-# Further keys of a document in an arm file, all texts.
-_TEXTS = ("repository", "path", "revision", "licence")
+
+
+def _names(value: Iterable[str]) -> tuple[str, ...]:
+    return tuple(value)
 
 
 @attrs.frozen(kw_only=True)
@@ -45,8 +47,8 @@ class SourceDocument:
     path: str = ""
     revision: str = ""
     licence: str = ""
-    gives: tuple[str, ...] = attrs.field(default=(), converter=tuple)
-    confirms: tuple[str, ...] = attrs.field(default=(), converter=tuple)
+    gives: tuple[str, ...] = attrs.field(default=(), converter=_names)
+    confirms: tuple[str, ...] = attrs.field(default=(), converter=_names)
 
     def __str__(self) -> str:
         """Return one line: title, place, revision and licence."""
@@ -81,9 +83,15 @@ def documents_in(top: Table) -> tuple[SourceDocument, ...]:
 
 
 def _document(table: Table) -> SourceDocument:
-    lists = {key: _quantities(table, key) for key in ("gives", "confirms")}
-    texts = {key: table.text(key, default="") for key in _TEXTS}
-    document = SourceDocument(title=table.text("title"), **texts, **lists)
+    document = SourceDocument(
+        title=table.text("title"),
+        repository=table.text("repository", default=""),
+        path=table.text("path", default=""),
+        revision=table.text("revision", default=""),
+        licence=table.text("licence", default=""),
+        gives=_quantities(table, "gives"),
+        confirms=_quantities(table, "confirms"),
+    )
     table.refuse_unknown_keys()
     return document
 

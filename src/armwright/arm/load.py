@@ -104,7 +104,7 @@ def load_arm(name: str | Path, *, packages: Mapping[str, Path | str] | None = No
             return load_mjcf(name)
         return read_arm(name)
     if name not in arm_names():
-        raise UnknownNameError("arm", name, arm_names(), similar=_similar(name), all_by="armwright arms")
+        raise UnknownNameError("arm", name, arm_names(), similar=_similar(str(name)), all_by="armwright arms")
     return read_arm(_CATALOGUE / f"{name}.toml")
 
 

@@ -214,6 +214,10 @@ def _motors(value: Iterable[Motor]) -> tuple[Motor, ...]:
     return _parts(value, Motor, "motors")
 
 
+def _documents(value: Iterable[SourceDocument]) -> tuple[SourceDocument, ...]:
+    return _parts(value, SourceDocument, "documents")
+
+
 def _same_length(arm: Arm, attribute: attrs.Attribute[Any], value: Sized) -> None:
     if len(value) != len(arm.joints):
         raise ShapeError(f"arm '{arm.name}': {len(arm.joints)} joints but {len(value)} {attribute.name}")
@@ -291,7 +295,7 @@ class Arm:
     tool_link: str = ""
     source: str = ""
     uncertainty: Uncertainty | None = None
-    documents: tuple[SourceDocument, ...] = attrs.field(default=(), converter=tuple, eq=False)
+    documents: tuple[SourceDocument, ...] = attrs.field(default=(), converter=_documents, eq=False)
 
     __reduce__ = reduce_by_fields
 
