@@ -165,6 +165,25 @@ def test_poses_are_those_of_pinocchio(make: Callable[[], Arm], rng: np.random.Ge
             np.testing.assert_allclose(data.oMf[tool].homogeneous, X, atol=RESIDUAL)
 
 
+@pytest.mark.parametrize("size", [1e-7, 1e-3])
+def test_an_arm_that_is_nearly_of_a_build(size: float, rng: np.random.Generator) -> None:
+    """A PUMA with small errors in all its numbers has as many configurations as without, each near one of those."""
+    puma = load_arm("puma560")
+    names = ("theta", "d", "a", "alpha")
+    moved = np.random.default_rng(0).normal(scale=size, size=(6, 4))
+    joints = [
+        attrs.evolve(joint, **{name: getattr(joint, name) + x for name, x in zip(names, row, strict=True)})
+        for joint, row in zip(puma.joints, moved, strict=True)
+    ]
+    for q in random_configurations(puma, rng, 2):
+        nominal = np.array([branch.q for branch in inverse(puma, forward(puma, q))])
+
+        found = np.array([branch.q for branch in inverse(attrs.evolve(puma, joints=joints), forward(puma, q))])
+
+        assert len(found) == len(nominal)
+        assert _turned_apart(puma, found[:, None], nominal).min(axis=-1).max() < 1e3 * size
+
+
 def test_offset_wrists_are_named_by_shoulder_and_elbow() -> None:
     """What continuation finds of an arm with an offset wrist has the names of other arms, and a number."""
     arm = xarm6()

@@ -4,7 +4,7 @@ With complex joint positions nearly every pose of such an arm has the same numbe
 with six revolute joints. They move steadily as the pose moves, and never meet on a way that is chosen at random. So
 once they are known for one complex pose, they are known for all: each is followed to the pose that is asked for, and
 the real ones are kept. For the first pose they are found from configurations at random, which are followed to it from
-their own poses, and by going round in closed loops of poses, from which they come back exchanged.
+their own poses, and by going round in closed loops through a real pose, from which they come back exchanged.
 
 Source:
     Sommese & Wampler (2005), "The numerical solution of systems of polynomials", parameter continuation; Duff, Hill,
@@ -117,8 +117,8 @@ class _Fibre(NamedTuple):
 def every_solution(arm: Arm, X: Array, near: Array) -> InverseSolution:
     """Return all configurations of any arm of six joints at one pose.
 
-    Where the pose is singular, or a path could not be followed to its end, the configurations that
-    ``numeric_inverse`` finds are added to those at the ends of the paths.
+    Where the pose is singular, a path could not be followed to its end, or a conjugate is missing, other ways to the
+    pose are tried, and what ``numeric_inverse`` finds is added.
 
     Args:
         arm: an arm of six joints.
@@ -132,7 +132,9 @@ def every_solution(arm: Arm, X: Array, near: Array) -> InverseSolution:
         q, arrived = _followed(fibre.chain, fibre.q, fibre.pose, target.scaled(*scales))
         ends.append(q)
         real.append(np.abs(q.imag).max(axis=-1) < np.where(arrived, _REAL, 10 * _REAL))
-        regular = len(q) > 0 and bool(arrived.all()) and len(_distinct(fibre.chain, q)) == len(q)
+        # Of a real pose they are all there only if each is another one and has its conjugate among them.
+        whole = len(q) == len(_distinct(fibre.chain, q)) == len(_distinct(fibre.chain, np.concatenate([q, q.conj()])))
+        regular = len(q) > 0 and bool(arrived.all()) and whole
         if regular:
             break
     starts = np.concatenate(ends).real[np.concatenate(real)]
@@ -163,14 +165,16 @@ def _fibre(arm: Arm) -> _Fibre:
     shape = (_SEEDS, arm.n)
     q = rng.uniform(-math.pi, math.pi, size=shape) + 0.4j * rng.normal(size=shape)
     q = np.where(chain.revolute, q, 0.5 * _complex(rng, *shape))
-    here, there = _Pose(_complex(rng, 4), _complex(rng, 4)), _Pose(_complex(rng, 4), _complex(rng, 4))
+    here, there = _Pose(_complex(rng, 4), _complex(rng, 4)), _Pose(*rng.normal(size=(2, 4)).astype(np.complex128))
     q, arrived = _followed(chain, q, _poses(chain.displacements(q)[0]), here)
     q = _distinct(chain, q[arrived])
     idle = 0
     for _ in range(_LOOPS):
         known = len(q)
         away, arrived = _followed(chain, q, here, there.scaled(*_complex(rng, 2)))
-        back, returned = _followed(chain, away[arrived], there, here.scaled(*_complex(rng, 2)))
+        # That pose is real: of every configuration the conjugate is one as well.
+        away = _distinct(chain, np.concatenate([away[arrived], away[arrived].conj()]))
+        back, returned = _followed(chain, away, there, here.scaled(*_complex(rng, 2)))
         q = _distinct(chain, np.concatenate([q, back[returned]]))
         idle = idle + 1 if len(q) == known else 0
         if idle == _IDLE_LOOPS:
