@@ -7,6 +7,8 @@ import stat
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
+from functools import cache
+from io import StringIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +19,9 @@ import typer.main
 from armwright.cli.app import app
 from armwright.errors import ExitStatus
 from armwright.files.store import cache_folder
+from files.logs_of_others import json_log, motion
 from fork_server import fork_server
+from identification.simulated import log, truth
 from samples import Sample
 
 pytestmark = pytest.mark.early
@@ -36,6 +40,7 @@ CALLS: dict[str, list[str]] = {
     "": ["arms", "--json"],
     "run": ["p.rlo", "--cell", "cell.toml", "-o", "out", "--json"],
     "check": ["p.rlo", "--cell", "cell.toml", "--json"],
+    "export": ["ros2", "p.rlo", "--cell", "cell.toml", "-o", "out", "--json"],
     "explain": ["E206", "--json"],
     "repl": ["p.rlo", "--cell", "cell.toml", "--json"],
     "studio": ["cell.toml", "p.rlo"],
@@ -54,10 +59,13 @@ CALLS: dict[str, list[str]] = {
     "singularity": ["ur5", "-q", Q, "--json"],
     "simulate": ["puma560", "-q", Q, "--duration", "0.01", "--json"],
     "move": ["joint", "puma560-seed", "poses.toml", "--no-film", "--json"],
+    "replay": ["log.mcap", "--json"],
     "iso9283": ["measured.csv", "--json"],
     "calibrate": ["puma560-seed", "points.csv", "--folds", "2", "--json"],
     "calibrate-camera": ["corners.csv", "--size", "640x480", "--squares", "9x7", "--square-mm", "30", "--json"],
     "plan-poses": ["ur5", "-n", "16", "--json"],
+    "plan-excitation": ["stanford", "--period", "2", "--harmonics", "3", "--json"],
+    "identify": ["puma560", "efforts.csv", "--json"],
     "clearance": [],
     "clearance simulate": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "--json"],
     "clearance sweep": ["five-bar", "-o", "out", "--paths", "x1", "-n", "2", "--workers", "1", "--json"],
@@ -186,6 +194,9 @@ def _fill(folder: Path) -> None:
     for name, example in GIVEN.items():
         shutil.copy(EXAMPLES / example, folder / name)
     (folder / "p.rlo").write_text(PROGRAM)
+    (folder / "efforts.csv").write_text(_efforts())
+    times = np.arange(0, 1, 0.02)
+    json_log(folder / "log.mcap", times, motion(times))
     (folder / "folder").mkdir()
     os.mkfifo(folder / "pipe")
     for name in ("zero", "zero.rlo"):
@@ -194,6 +205,17 @@ def _fill(folder: Path) -> None:
             os.mknod(folder / name, stat.S_IFCHR | 0o666, os.makedev(1, 5))
         except PermissionError:
             (folder / name).symlink_to("/dev/zero")
+
+
+@cache
+def _efforts() -> str:
+    """Return a log of efforts, from which an arm can be identified."""
+    readings = log(truth(), np.random.default_rng(3), seconds=8.0)
+    heads = ["time_s", *(f"joint_{i}_deg" for i in range(1, 7)), *(f"tau{i}" for i in range(1, 7))]
+    rows = np.column_stack([readings.t, np.degrees(readings.q), readings.effort])
+    text = StringIO()
+    np.savetxt(text, rows, delimiter=",", header=",".join(heads), comments="", fmt="%.9g")
+    return text.getvalue()
 
 
 @contextmanager

@@ -79,7 +79,9 @@ def test_a_turn_that_few_joints_cannot_make() -> None:
     X = forward(scara, [q, q])
     X[1, :3, :3] = X[0, :3, :3] @ rotation_from_vector((0.0, 1.0, 0.0))
 
-    with pytest.raises(PathError, match=r"'scara', an arm of 4 joints, cannot turn its tool to the pose: .* deg away") as stopped:
+    with pytest.raises(
+        PathError, match=r"'scara', an arm of 4 joints, cannot turn its tool to the pose: .* deg away"
+    ) as stopped:
         cartesian_move(scara, X, near=q)
 
     assert stopped.value.cause == "reach"

@@ -165,7 +165,7 @@ def dump(node: object) -> Iterator[str]:
             yield f"{head}{now}"
             continue
         parts = {name: value for name, value in _fields(now) if name != "key" and value is not None and value != ()}
-        leaves = [str(value) for value in parts.values() if isinstance(value, str | float)]
+        leaves = [str(value) for value in parts.values() if isinstance(value, str | float) and value != ""]
         yield head + " ".join((type(now).__name__, *leaves[:1]))
         inner = [(name, value) for name, value in parts.items() if not isinstance(value, str | float | frozenset)]
         waiting += [(value, depth + 1, name) for name, value in reversed(inner)]
