@@ -6,7 +6,7 @@ import pytest
 
 from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
-from armwright.cell.signals import Input
+from armwright.cell.signals import Input, Wiring
 from armwright.cell.simulator import Simulator
 from armwright.program import Source, compile as translate
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
@@ -28,7 +28,9 @@ INPUTS = {
 def signals_cell(**inputs: Input) -> Cell:
     devices = frozenset({"LAMP", "PRESS", "VALVE"})
     return attrs.evolve(
-        cell_of("cell1"), devices=devices, analogue_devices=frozenset({"VALVE"}), inputs={**INPUTS, **inputs}
+        cell_of("cell1"),
+        devices=devices,
+        wiring=Wiring(inputs={**INPUTS, **inputs}, analogue_devices=frozenset({"VALVE"})),
     )
 
 

@@ -28,8 +28,8 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
     """
     out = Emitter(source, symbols.scope(None))
     context = Context(GENERATORS, out, flow, spelling)
-    for constant in program.constants:
-        frames.assign(context, tree.Assign(constant.span, constant.name, constant.value))
+    for constant in symbols.constant_assignments(program):
+        frames.assign(context, constant)
     context.generate(*program.statements)
     out.begin()
     out.emit(Op.STOP, span=program.end)
