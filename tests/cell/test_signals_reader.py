@@ -33,14 +33,14 @@ PLAIN = {{}}
     )
     cell = read_cell(path)
 
-    assert cell.inputs == {
+    assert cell.wiring.inputs == {
         "DOOR": Input(start=1.0, timeline=((0.5, 0.0), (2.0, 1.0))),
         "PRESSED": Input(follows="PRESS", delay=0.8),
         "ASKED": Input(event="READY", pulse=0.2),
         "LEVEL": Input(analogue=True, start=-2.5, timeline=((1.0, 3.5),)),
         "PLAIN": Input(),
     }
-    assert (set(cell.devices or ()), cell.analogue_devices) == ({"PRESS", "VALVE"}, {"VALVE"})
+    assert (set(cell.devices or ()), cell.wiring.analogue_devices) == ({"PRESS", "VALVE"}, {"VALVE"})
 
 
 @pytest.mark.parametrize(

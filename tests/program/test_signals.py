@@ -1,20 +1,24 @@
 """Inputs and outputs at work: timelines, links, live switches, pulses, and waits for conditions."""
 
+from pathlib import Path
+
 import attrs
 import numpy as np
 import pytest
 
 from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
-from armwright.cell.signals import Input
+from armwright.cell.signals import Input, Wiring
 from armwright.cell.simulator import Simulator
-from armwright.program import Source, compile as translate
+from armwright.program import Source, compile as translate, run as run_program
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import RunError
+from armwright.program.vm.recording import log_csv_lines
 from program.running import cell_of, code_of, failure, printed, run
 from samples import Sample
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 PERIOD = 1e-3
 INPUTS = {
     "DOOR": Input(start=1.0, timeline=((0.5, 0.0), (1.0, 1.0))),
@@ -28,7 +32,9 @@ INPUTS = {
 def signals_cell(**inputs: Input) -> Cell:
     devices = frozenset({"LAMP", "PRESS", "VALVE"})
     return attrs.evolve(
-        cell_of("cell1"), devices=devices, analogue_devices=frozenset({"VALVE"}), inputs={**INPUTS, **inputs}
+        cell_of("cell1"),
+        devices=devices,
+        wiring=Wiring(inputs={**INPUTS, **inputs}, analogue_devices=frozenset({"VALVE"})),
     )
 
 
@@ -152,6 +158,18 @@ def test_failures(text: str, code: str, says: str) -> None:
 
     assert raised.value.diagnostic.code == code
     assert says in raised.value.diagnostic.message
+
+
+def test_press() -> None:
+    """The example: the press waits until the door is closed again at 6.5 s, and refuses to work when its oil is hot."""
+    recording = run_program(EXAMPLES / "press.rlo", arguments={"parts": 2})
+    logs = log_csv_lines(recording.effects)["press"]
+    opened = next(effect for effect in recording.effects if effect.text.startswith("WAIT UNTIL INPUT(door_closed)"))
+
+    assert (opened.t0 < 6.5, opened.t1) == (True, pytest.approx(6.5))
+    assert len(logs) == 2
+    assert float(logs[1].split(",")[2]) == pytest.approx(0.8)
+    assert printed(recording) == ["the oil has 71 degrees"]
 
 
 def test_live_switch() -> None:

@@ -66,7 +66,7 @@ def test_constants() -> None:
 
 
 def test_constants_come_first_in_the_code() -> None:
-    """Constants are worked out in front of the first statement, at which a debugger stops first."""
+    """Constants are worked out in front of the first statement, each in a step of its own."""
     code = code_of("VAR n : SCALAR ; CONST k = 3 ; BEGIN n = k END.", cell_of("cell1"))
 
-    assert [step.begins for step in code.instructions] == [False, True, True]
+    assert [(step.begins, step.operands[0]) for step in code.instructions[:2]] == [(True, "K"), (True, "N")]

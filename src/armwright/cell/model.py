@@ -13,7 +13,7 @@ from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.outputs import Controller, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
-from armwright.cell.signals import Input
+from armwright.cell.signals import Wiring
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
@@ -136,8 +136,7 @@ class Cell:
         camera: (4, 4) pose of the camera in the world.
         devices: that can be operated, by name, with the output of a controller that switches each, as far as it is
             known; None allows any name.
-        analogue_devices: those that can be set to any number.
-        inputs: by name, what the program can read, and how that behaves in a simulated cell.
+        wiring: its inputs, and which of its devices are analogue.
         contact: plane with which arms and what they carry come into contact.
         alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
@@ -167,8 +166,7 @@ class Cell:
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
     devices: Mapping[str, Output | None] | None = attrs.field(default=None, converter=_as_devices)
-    analogue_devices: frozenset[str] = frozenset()
-    inputs: Mapping[str, Input] = attrs.field(factory=dict)
+    wiring: Wiring = attrs.field(factory=Wiring)
     contact: ContactPlane = attrs.field(factory=ContactPlane)
     alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1

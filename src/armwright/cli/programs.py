@@ -1,6 +1,6 @@
 """Options, cells and diagnostics that the commands for programs share."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -36,6 +36,10 @@ Physics: TypeAlias = Annotated[
 Seed: TypeAlias = Annotated[
     int, Option(min=0, max=2**63 - 1, help="Seed of what is random in a cell with physics: parts, sensors, cameras.")
 ]
+ProgramArguments: TypeAlias = Annotated[
+    list[str] | None,
+    Option("--arg", metavar="NAME=VALUE", help="Value of a constant of the program (CONST), in place of its own."),
+]
 Strict: TypeAlias = Annotated[bool, Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
 
 
@@ -63,8 +67,34 @@ def read_cell_option(path: Path | None) -> "Cell | None":
     return None if path is None else read_cell(path)
 
 
+def read_arguments(texts: Iterable[str] | None) -> dict[str, str]:
+    """Return the values of the options ``--arg`` by the names of constants.
+
+    Raises:
+        BadParameter: a text is not of the form NAME=VALUE, or a name occurs twice.
+    """
+    from armwright.cli.options import usage_error
+
+    values: dict[str, str] = {}
+    for text in texts or ():
+        name, sign, value = text.partition("=")
+        if not sign or not name.strip():
+            raise usage_error("--arg", f"expected NAME=VALUE, such as pitch=20, got {text!r}")
+        if name.strip() in values:
+            raise usage_error("--arg", f"{name.strip()} is given twice")
+        values[name.strip()] = value.strip()
+    return values
+
+
 def load_program(
-    path: Path, cell: Path | None, *, strict: bool, std: Standard, as_json: bool = False, to_errors: bool = False
+    path: Path,
+    cell: Path | None,
+    *,
+    strict: bool,
+    std: Standard,
+    as_json: bool = False,
+    to_errors: bool = False,
+    arguments: "Mapping[str, str] | None" = None,
 ) -> "LoadedProgram":
     """Return the code of a program with its cell; the diagnostics of a program with errors are printed.
 
@@ -76,7 +106,7 @@ def load_program(
     from armwright.program.api import ProgramError, load
 
     try:
-        return load(path, read_cell_option(cell), strict=strict, std=std)
+        return load(path, read_cell_option(cell), strict=strict, std=std, arguments=arguments)
     except ProgramError as error:
         compiled = error.compilation
         if as_json:

@@ -13,6 +13,7 @@ from armwright.cli.output import command_line, print_json, print_result, print_r
 from armwright.cli.programs import (
     CellFile,
     Physics,
+    ProgramArguments,
     ProgramFile,
     Seed,
     Std,
@@ -20,6 +21,7 @@ from armwright.cli.programs import (
     hardware_factory,
     load_program,
     print_diagnostics,
+    read_arguments,
 )
 from armwright.cli.progress import waiting
 from armwright.cli.trials import MAX_TRIALS, Machines, SingleTrial, TrialVerdict, check_trial_options, run_trials
@@ -45,6 +47,7 @@ Around: TypeAlias = Literal["via", "damped", "none"]
 def run(  # noqa: PLR0917 - Typer reads one parameter per option
     program: ProgramFile,
     cell: CellFile = None,
+    arg: ProgramArguments = None,
     output: OutputFolder = None,
     servo_ms: Annotated[
         float | None, Option(help="Servo period in ms; the default is that of the cell file, or 1.")
@@ -113,7 +116,8 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     check_log(log, output if trials is None else None)
     warn_of_stray(program)
-    loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json)
+    arguments = read_arguments(arg)
+    loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json, arguments=arguments)
     if loaded.cell is None:
         needs = "needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
         raise usage_error("--cell", f"missing: {program} {needs}")
@@ -129,6 +133,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "strict": strict,
         **({"physics": True, "seed": seed} if physics else {}),
         **({} if trial is None else {"trial": trial}),
+        **({"arguments": arguments} if arguments else {}),
     }
     inputs = RunInputs(
         program=program,

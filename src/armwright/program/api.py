@@ -25,6 +25,7 @@ from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.semantics import check
+from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
@@ -122,6 +123,7 @@ def compile(  # noqa: A001 - what a translator does
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
     names_only: bool = False,
+    arguments: Arguments | None = None,
 ) -> Compilation:
     """Compile a program.
 
@@ -134,6 +136,7 @@ def compile(  # noqa: A001 - what a translator does
         read_import: how to read what an IMPORT names; of a file, the files beside it unless something else is given;
             of a text, imports stay unknown without it.
         names_only: whether to stop when syntax, names and types have been checked; ``with_flow`` goes on from there.
+        arguments: values for constants of the program, in place of their own: numbers, conditions and texts, by name.
 
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
@@ -141,7 +144,8 @@ def compile(  # noqa: A001 - what a translator does
     Raises:
         FileFormatError: a file cannot be read, or is not text, or is no cell.
         KindError: an argument is of the wrong kind.
-        UnknownNameError: there is no such language.
+        UnknownNameError: there is no such language, or an argument is for no constant of the program.
+        InvalidValueError: an argument is not of the type of its constant.
     """
     if not isinstance(program, str | Path | Source):
         raise KindError(f"program: expected the path of a file or a Source, got {shown(program)}")
@@ -155,7 +159,7 @@ def compile(  # noqa: A001 - what a translator does
         source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
     model = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
     with pause_garbage_collection():
-        compiled = _check_names(source, model, strict=strict, std=std, read_import=read_import)
+        compiled = _check_names(source, model, strict=strict, std=std, read_import=read_import, arguments=arguments)
         return compiled if names_only else _generate_code(analyse_flow(compiled))
 
 
@@ -168,6 +172,7 @@ def run(
     hardware: Hardware | HardwareFactory | None = None,
     limits: Limits | None = None,
     progress: Progress | None = None,
+    arguments: Arguments | None = None,
 ) -> Recording:
     """Compile a program and run it in a cell.
 
@@ -180,6 +185,7 @@ def run(
             kinematic simulator unless something else is given.
         limits: when the program is taken to run for ever.
         progress: told before each statement: the time on the cell's clock [s] and the line.
+        arguments: values for constants of the program, in place of their own.
 
     Returns:
         All that happened, tick by tick.
@@ -187,7 +193,9 @@ def run(
     Raises:
         FileFormatError: a file cannot be read, or is not text, or is no cell.
         ProgramError: the program has errors.
-        InvalidValueError: there is no cell, or one beside a compiled program.
+        UnknownNameError: an argument is for no constant of the program.
+        InvalidValueError: there is no cell; a cell or arguments stand beside a compiled program; or an argument is not
+            of the type of its constant.
         KindError: an argument is of the wrong kind.
         RunError: the program could not go on; it has the recording up to there.
 
@@ -199,9 +207,11 @@ def run(
     if isinstance(program, Compilation):
         if cell is not None:
             raise InvalidValueError("cell: a compiled program has its cell; pass the cell to `compile`")
+        if arguments:
+            raise InvalidValueError("arguments: a compiled program has its constants; pass the arguments to `compile`")
         compiled = program if program.flow is not None else _generate_code(analyse_flow(program))
     else:
-        compiled = compile(program, cell, strict=strict, std=std)
+        compiled = compile(program, cell, strict=strict, std=std, arguments=arguments)
     if compiled.code is None:
         raise ProgramError(compiled)
     if compiled.cell is None:
@@ -213,7 +223,12 @@ def run(
 
 
 def load(
-    path: Path, cell: Cell | None = None, *, strict: bool = False, std: Standard = Standard.RLO_2
+    path: Path,
+    cell: Cell | None = None,
+    *,
+    strict: bool = False,
+    std: Standard = Standard.RLO_2,
+    arguments: Arguments | None = None,
 ) -> LoadedProgram:
     """Compile the program in a file, or read a file of intermediate code.
 
@@ -222,15 +237,20 @@ def load(
         cell: what the program acts on; without one, the first that it IMPORTs and that has arms.
         strict: whether an AFFIX that is only implied is an error.
         std: the language that the program is written in.
+        arguments: values for constants of the program, in place of their own.
 
     Raises:
         FileFormatError: the file cannot be read, or is not text.
+        UnknownNameError: an argument is for no constant of the program.
+        InvalidValueError: an argument is not of the type of its constant, or the file holds intermediate code.
         CodeError: the intermediate code is invalid.
         ProgramError: the program has errors.
     """
     if path.suffix == CODE_SUFFIX:
+        if arguments:
+            raise InvalidValueError(f"arguments: {path} holds intermediate code, whose constants have their values")
         return LoadedProgram(code=assemble(read_program(path), str(path)), cell=cell, is_code_file=True)
-    compiled = compile(path, cell, strict=strict, std=std)
+    compiled = compile(path, cell, strict=strict, std=std, arguments=arguments)
     if compiled.code is None:
         raise ProgramError(compiled)
     imports = imported_files(path, compiled)
@@ -323,7 +343,13 @@ def _imported_cell(program: tree.Program, read_import: ReadImport) -> Cell | Non
 
 
 def _check_names(
-    source: Source, cell: Cell | KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
+    source: Source,
+    cell: Cell | KnownCell | None,
+    *,
+    strict: bool,
+    std: Standard,
+    read_import: ReadImport | None,
+    arguments: Arguments | None,
 ) -> Compilation:
     """Return a program with its syntax, names and types checked."""
     text, diagnostics = blank_line_numbers(source)
@@ -333,7 +359,9 @@ def _check_names(
         read_import = cache(_limit_imports(read_import))
         cell = _imported_cell(program, read_import) if cell is None else cell
     cell_symbols = known_cell(cell) if isinstance(cell, Cell) else cell
-    symbols, name_errors, imports = check.check(program, cell_symbols, std=std, read_import=read_import)
+    symbols, name_errors, imports = check.check(
+        program, cell_symbols, std=std, read_import=read_import, arguments=arguments
+    )
     diagnostics += [*scanned.diagnostics, *syntax_errors]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
     # Where the parser had to guess, a name may seem unused.

@@ -28,8 +28,7 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
     """
     out = Emitter(source, symbols.scope(None))
     context = Context(GENERATORS, out, flow, spelling)
-    for constant in program.constants:
-        frames.assign(context, tree.Assign(constant.span, constant.name, constant.value))
+    context.generate(*symbols.constant_assignments(program))
     context.generate(*program.statements)
     out.begin()
     out.emit(Op.STOP, span=program.end)

@@ -145,7 +145,8 @@ def find_slot(machine: Machine, frame: StackFrame, parsed: CheckedExpression) ->
     if isinstance(node, tree.ArmName) and node.key not in machine.cell.arms:
         raise ExpressionError(f"the cell has no arm {node.key}")
     if isinstance(node, tree.Name | tree.ArmName):
-        return frame.activation.bindings.get(node.key, node.key)
+        is_value = isinstance(node, tree.Name) and parsed.scope.is_value(node.key)
+        return None if is_value else frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):
         return None
     evaluator, process, operand = _execute(machine, frame, parsed)

@@ -57,8 +57,8 @@ def check(
     """
     state = FlowState(program, symbols, spelling, cell, source=source, strict=strict)
     context = Context(STEPS, state)
-    for constant in program.constants:
-        frames.assign(state, tree.Assign(constant.span, constant.name, constant.value))
+    for constant in symbols.constant_assignments(program):
+        frames.assign(state, constant)
     context.follow(*program.statements)
     state.ended = False
     calls.follow_uncalled(context)

@@ -240,6 +240,8 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
     # What ends a block is not offered after each of its statements, unless it is being written.
     if not expected.starts_statement and context.word.start == context.word.end:
         allowed = allowed - BLOCK_CLOSERS - {"RECOVER"}
+    if context.preceding and context.preceding[-1].key == "WAIT":
+        allowed = allowed | {"UNTIL"}
     for word in dict.fromkeys(expected.words):
         last = word.rpartition(" ")[2]
         # The action of ON has ended before the position, or starts after it.
@@ -329,7 +331,7 @@ class _ItemFactory:
     def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the devices of the cell."""
         if operand.inputs and self._analysis.cell is not None:
-            for name in sorted(self._analysis.cell.inputs):
+            for name in sorted(self._analysis.cell.wiring.inputs):
                 yield self._item(self._match_case(name), Kind.Property, "", "input")
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):

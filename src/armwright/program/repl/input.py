@@ -63,6 +63,7 @@ def parse_input(
     *,
     names: Collection[str] = (),
     procedures: Collection[str] = (),
+    functions: Collection[str] = (),
     is_file: bool = False,
 ) -> ParsedInput:
     """Read one input.
@@ -72,7 +73,8 @@ def parse_input(
         start: where it begins.
         std: the language.
         names: the variables that are declared.
-        procedures: the procedures that are.
+        procedures: the procedures and functions that are.
+        functions: those of them that have a value.
         is_file: whether it is the text of a file; elsewhere a number that begins a line may begin an expression.
     """
     text, diagnostics = source.text[start:], []
@@ -82,7 +84,7 @@ def parse_input(
     scanned = scan(source, " " * start + text, std)
     diagnostics += scanned.diagnostics
     tokens = _strip_program_frame(scanned.tokens[:-1])
-    reader = _InputParser(source, std, names, procedures)
+    reader = _InputParser(source, std, names, procedures, functions)
     for is_header, part in _split_parts(tokens, VOCABULARIES[std]):
         if is_header:
             reader.parse_headers(part)
@@ -232,9 +234,16 @@ def _end_of_statements(tokens: Sequence[Token], index: int, words: Vocabulary) -
 class _InputParser:
     """Parses the parts of one input."""
 
-    def __init__(self, source: Source, std: Standard, names: Collection[str], procedures: Collection[str]) -> None:
+    def __init__(
+        self,
+        source: Source,
+        std: Standard,
+        names: Collection[str],
+        procedures: Collection[str],
+        functions: Collection[str],
+    ) -> None:
         self._source, self._std, self._names = source, std, set(names)
-        self._procedures = set(procedures)
+        self._procedures, self._functions = set(procedures), set(functions)
         self.headers: list[tree.Header] = []
         self.statements: list[tree.Statement] = []
         self.printed_starts: list[int] = []
@@ -257,6 +266,7 @@ class _InputParser:
                 self._names.add(header.name.key)
             elif isinstance(header, tree.Procedure):
                 self._procedures.add(header.name.key)
+                (self._functions.discard if header.result is None else self._functions.add)(header.name.key)
 
     def parse_statements(self, part: Sequence[Token]) -> None:
         """Read statements; an expression among them becomes a PRINT of it."""
@@ -301,7 +311,7 @@ class _InputParser:
             words = VOCABULARIES[self._std].statements
             return name.key not in self._procedures and (is_known or closest(name.text, words) is None)
         if remaining[0].key == "(":
-            return name.key in FUNCTIONS and name.key not in self._procedures
+            return name.key in (self._functions if name.key in self._procedures else FUNCTIONS)
         return remaining[0].key in _OPERATORS
 
 

@@ -230,7 +230,13 @@ class Session:
         start, symbols = len(self._text), self.state.symbols
         source = Source(self.name, self._text + (text if text.endswith("\n") else f"{text}\n"))
         entry = parse_input(
-            source, start, self.std, names=symbols.types, procedures=symbols.procedures, is_file=is_file
+            source,
+            start,
+            self.std,
+            names=symbols.types,
+            procedures=symbols.procedures,
+            functions=[key for key, procedure in symbols.procedures.items() if procedure.is_function],
+            is_file=is_file,
         )
         if not (entry.is_complete or complete):
             return InputResult(is_complete=False, source=source)

@@ -57,8 +57,9 @@ def known_cell(cell: Cell) -> KnownCell:
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=None if cell.devices is None else frozenset(cell.devices),
-        analogue=cell.analogue_devices | {name for name, source in cell.inputs.items() if source.analogue},
-        inputs=frozenset(cell.inputs),
+        analogue=cell.wiring.analogue_devices
+        | {name for name, source in cell.wiring.inputs.items() if source.analogue},
+        inputs=frozenset(cell.wiring.inputs),
         visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
     )

@@ -3,6 +3,7 @@
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
 from armwright.program.semantics import control_flow, devices, frames, functions, headers, move, output
+from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.calls import CallChecker
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
 from armwright.program.semantics.context import Checks, Context
@@ -19,6 +20,7 @@ def check(
     *,
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
+    arguments: Arguments | None = None,
 ) -> tuple[Symbols, list[Diagnostic], tuple[ImportedFrames, ...]]:
     """Check names, types, clauses and values.
 
@@ -28,12 +30,17 @@ def check(
         std: the language it is written in.
         read_import: gives what the file of an IMPORT holds, and raises an ArmwrightError when it cannot be read;
             without it nothing is looked up.
+        arguments: values for constants of the program, in place of their own.
 
     Returns:
         The names of the program, what is wrong, and what was imported.
+
+    Raises:
+        UnknownNameError: an argument is for no constant of the program.
+        InvalidValueError: an argument is not of the type of its constant.
     """
     names = NameResolver(cell, std)
-    procedures = headers.declare(names, program, read_import)
+    procedures = headers.declare(names, program, read_import, arguments or {})
     calls = CallChecker(names)
     for procedure in procedures:
         with names.enter_procedure(procedure):

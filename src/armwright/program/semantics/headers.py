@@ -7,6 +7,7 @@ from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
+from armwright.program.semantics.arguments import Arguments, argument_values
 from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_NAME
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
 from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
@@ -28,7 +29,9 @@ _UNIT_NAMES: Mapping[str, str] = {
 }
 
 
-def declare(names: NameResolver, program: tree.Program, read_import: ReadImport | None) -> list[ProcedureSymbols]:
+def declare(
+    names: NameResolver, program: tree.Program, read_import: ReadImport | None, arguments: Arguments
+) -> list[ProcedureSymbols]:
     """Take up all that the headers declare, wherever they stand among each other.
 
     Returns:
@@ -42,6 +45,8 @@ def declare(names: NameResolver, program: tree.Program, read_import: ReadImport 
         _declare_variables(names, names.symbols, declaration)
     for constant in program.constants:
         _declare_constant(names, constant)
+    constants = {node.name.key: node for node in program.constants}
+    names.symbols.arguments = argument_values(arguments, constants, names.symbols.types)
     return [_declare_procedure(names, node) for node in program.procedures]
 
 

@@ -63,6 +63,7 @@ class Symbols(SymbolTable):
         procedures: by name.
         units: what bare numbers count.
         constants: the names of CONST parts.
+        arguments: values that are given for constants in place of their own.
         imported: the frames that IMPORT has brought.
         open_import: whether some IMPORT was not looked up, so that any name may be that of a frame in it.
         std: the language.
@@ -71,9 +72,15 @@ class Symbols(SymbolTable):
     procedures: dict[str, ProcedureSymbols] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
     constants: set[str] = attrs.field(factory=set)
+    arguments: dict[str, tree.Expression] = attrs.field(factory=dict)
     imported: set[str] = attrs.field(factory=set)
     open_import: bool = False
     std: Standard = Standard.RLO_2
+
+    def constant_assignments(self, program: tree.Program) -> list[tree.Assign]:
+        """Return the constants of a program as assignments, each of its own value or the one that is given for it."""
+        nodes = program.constants
+        return [tree.Assign(node.span, node.name, self.arguments.get(node.name.key, node.value)) for node in nodes]
 
     def scope(self, procedure: str | None) -> "Scope":
         """Return the names as the statements of a procedure see them, or those of the main program for None.

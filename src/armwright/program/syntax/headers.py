@@ -115,6 +115,8 @@ def _constants(tokens: TokenStream) -> list[tree.Header]:
     constants: list[tree.Header] = []
     while not constants or (tokens.current.kind is TokenKind.NAME and tokens.peek().key in ("=", ":=", "==")):
         start = tokens.current
+        if start.kind is TokenKind.KEYWORD:
+            tokens.report_reserved_name()
         name = tokens.take_name()
         tokens.check_name_length(name)
         tokens.declared.add(name.key)

@@ -172,7 +172,10 @@ class TokenStream:
     @property
     def starts_header_in_context(self) -> bool:
         """Whether two words stand here of which the first starts a part in front of BEGIN."""
-        return self.matches_word(*HEADERS_IN_CONTEXT) and self.peek().kind is _NAME
+        following = self.peek()
+        # A reserved word behind it was meant as a name.
+        is_name = following.kind is _NAME or (following.kind is _KEYWORD and self.peek(2).key in ("=", ":=", "(", ":"))
+        return self.matches_word(*HEADERS_IN_CONTEXT) and is_name
 
     def note_expected_words(
         self, *keys: str, starts_statement: bool = False, present_clauses: frozenset[str] = frozenset()
