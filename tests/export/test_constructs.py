@@ -4,9 +4,11 @@ import re
 from collections.abc import Callable
 from functools import cache
 
+import attrs
 import pytest
 
 from armwright.cell import read_cell
+from armwright.cell.reader import DETOURS
 from armwright.export import ExportError, export_run
 from armwright.program import Recording, Source, run
 from export.cases import CELLS, ROOT
@@ -51,8 +53,17 @@ PROGRAMS = {
     ),
     "a second arm": "MOVE ARM_2 TO ARM_2 * XYZ(0, 0, 0.05) ;",
 }
-# Where a path is not a straight line after all; the straight way crosses the axis of joint 1.
+# Where a path is not a straight line after all; the straight way comes too near to the axis of joint 1.
 DETOUR = "detours of straight lines"
+AROUND = """
+VAR a, b : FRAME ;
+BEGIN
+  a = (1,0,0, 0,-1,0, 0,0,-1,  0.40,0.02,0.30) ;
+  b = (1,0,0, 0,-1,0, 0,0,-1, -0.40,0.02,0.30) ;
+  MOVE ARM_1 TO a ;
+  MOVE ARM_1 TO b STRAIGHTLY ;
+END.
+"""
 
 
 def cell_text(name: str) -> str:
@@ -118,3 +129,14 @@ def test_what_is_fixed_is_said(construct: str, recorded: Callable[[str, str], Re
     notes = export_run("ros2", recorded("ros2", construct), "construct").proof.notes
 
     assert [note[:8] for note in notes] == ["line 9: "]
+
+
+def test_detours_are_knots() -> None:
+    """A detour is written as a path past frames is."""
+    recording = run(Source("construct.rlo", AROUND), attrs.evolve(read_cell(CELLS["urscript"]), around=DETOURS["via"]))
+
+    assert [stage.stage.detour is None for stage in recording.stages] == [True, False]
+    for target in ("urscript", "ros2"):
+        exported = export_run(target, recording, "construct")
+        assert any(TABLE[DETOUR][TARGETS.index(target)].strip("`") in text for text in exported.files.values())
+    assert TABLE[DETOUR] == TABLE["VIA"]

@@ -285,7 +285,7 @@ class _Comparing:
     def _end(self, action: LineAction) -> Array:
         """Return the pose (4, 4) of the tool at the end of a line, seen from the base of the arm."""
         if action.q is not None:
-            return self._model.pose(self._model.joints(action.q)[None])[0]
+            return np.asarray(self._model.pose(self._model.joints(action.q)[None])[0])
         if action.X is None:
             raise CheckError(f"line {action.line}: a straight line without an end")
         return np.asarray(self._program.mapped.X_BC @ action.X)

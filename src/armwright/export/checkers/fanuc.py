@@ -50,7 +50,7 @@ def read(text: str) -> ReadProgram:
 class _Reader:
     """The registers of the controller while its program is read."""
 
-    def __init__(self, places: Mapping[str, tuple[int, Array]]) -> None:
+    def __init__(self, places: Mapping[str, tuple[str, Array]]) -> None:
         self.tool: Array | None = None
         self.actions: list[Action] = []
         self._places = places
