@@ -134,7 +134,7 @@ def test_joints_have_standard_deviations_too() -> None:
     [
         ((str(CORNERS), *BOARD), 2, "expected the size of the pictures with a table of corners"),
         ((*TABLE, "--arm", "ur5"), 2, "expected both --arm and --joints, or neither"),
-        ((*TABLE, "--arm", "ur55", "--joints", str(JOINTS)), 2, "Did you mean 'ur5'?"),
+        ((*TABLE, "--arm", "ur55", "--joints", str(JOINTS)), 2, "no arm 'ur55'. Did you mean 'ur"),
         ((*TABLE, "--arm", "ntu-3r", "--joints", str(JOINTS)), 4, "joint_4_deg"),
         ((*TABLE, *ARM, "--setup", "hand"), 2, "expected eye-in-hand or eye-to-hand, got hand"),
         ((*TABLE, *ARM, "--setup", "eye-to-hand"), 3, "beside the arm"),

@@ -30,6 +30,7 @@ CELLS = {
     "gearbox": "puma_cell",
     "around": "puma_cell",
     "peg": "peg_cell",
+    "press": "press_cell",
     "stack_by_vision": "vision_cell",
     "insert_peg": "socket_cell",
     "hand_over": "two_arms",
