@@ -109,6 +109,29 @@ def test_wait_that_is_too_late() -> None:
     assert (error.diagnostic.code, error.time) == ("E507", pytest.approx(0.7))
 
 
+def test_event_within_a_time() -> None:
+    """A WAIT for an event ends with the SIGNAL or when its time is over, whichever is first; a late SIGNAL is kept."""
+    text = """COBEGIN
+      BEGIN WAIT ready WITHIN 2 ELSE PRINT("wrong") ; PRINT("came", TIME) ;
+        WAIT ready WITHIN 1 ELSE PRINT("late", TIME) ; PAUSE 3 ;
+        WAIT ready WITHIN 0 ELSE PRINT("wrong") ; PRINT(TIME) END ;
+      BEGIN PAUSE 0.5 ; SIGNAL ready ; PAUSE 2 ; SIGNAL ready END
+    COEND ; TRY WAIT ready WITHIN 0.5 RECOVER (timeout) PRINT(MESSAGE, TIME) END ;"""
+
+    assert lines(text) == ["came 0.5", "late 1.5", "4.5", "what this WAIT waits for did not come in time 5"]
+
+
+def test_waits_of_different_priority() -> None:
+    """A signal goes to the process with the higher priority, and the other waits on until its time is over."""
+    text = """COBEGIN
+      BEGIN WAIT ready WITHIN 2 ELSE PRINT("first late", TIME) END ;
+      PRIORITY 5 : BEGIN WAIT ready WITHIN 2 ; PRINT("second", TIME) END ;
+      BEGIN PAUSE 1 ; SIGNAL ready END
+    COEND ;"""
+
+    assert lines(text) == ["second 1", "first late 2"]
+
+
 def test_wait_that_need_not_wait() -> None:
     """A condition that holds takes no time, also where none is left."""
     assert lines('WAIT UNTIL TRUE ; WAIT UNTIL TRUE WITHIN 0 ELSE PRINT("late") ; PRINT(TIME) ;') == ["0"]

@@ -80,6 +80,28 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     out.patch_jump(over)
 
 
+def wait(context: Context, node: tree.Wait) -> None:
+    """Generate a wait for an event."""
+    out, event = context.out, context.out.value(node.event)
+    if node.limit is None:
+        out.emit(Op.WAIT, event, span=node.span)
+        return
+    limit = out.value(node.limit)
+    attempt = out.emit(Op.AWAIT, event, LATER, limit, span=node.head)
+    over = out.emit(Op.JMP, LATER, span=node.head)
+    out.patch_jump(attempt)
+    _late(context, node)
+    out.patch_jump(over)
+
+
+def _late(context: Context, node: tree.Wait | tree.WaitUntil) -> None:
+    """Generate what is done when a wait is over in vain."""
+    if node.otherwise is None:
+        context.out.emit(Op.LATE, span=node.head)
+    else:
+        context.generate(node.otherwise)
+
+
 def wait_until(context: Context, node: tree.WaitUntil) -> None:
     """Generate a wait for a condition, which stands behind it, ended by RET."""
     out, limit = context.out, () if node.limit is None else (context.out.value(node.limit),)
@@ -90,10 +112,7 @@ def wait_until(context: Context, node: tree.WaitUntil) -> None:
     out.value(node.condition, truth)
     out.emit(Op.RET, span=node.head)
     late = out.here
-    if node.otherwise is None:
-        out.emit(Op.LATE, span=node.head)
-    else:
-        context.generate(node.otherwise)
+    _late(context, node)
     out.instructions[wait] = attrs.evolve(out.instructions[wait], operands=(condition, truth, late, *limit))
     out.patch_jump(over)
 
@@ -144,7 +163,7 @@ GENERATORS: Generators = {
     tree.For: for_,
     tree.Cobegin: cobegin,
     tree.Signal: one_instruction(Op.SIG),
-    tree.Wait: one_instruction(Op.WAIT),
+    tree.Wait: wait,
     tree.WaitUntil: wait_until,
     tree.Pause: one_instruction(Op.PAUSE),
     tree.Lock: lock,

@@ -132,6 +132,7 @@ class Op(enum.StrEnum):
     QUIT = "QUIT", ""  # end of a process
     SIG = "SIG", "E"  # event
     WAIT = "WAIT", "E"  # event
+    AWAIT = "AWAIT", "EjN"  # event, place when it is too late, seconds
     UNTIL = "UNTIL", "jnj(N)"  # condition, truth value, place when it is too late[, seconds]: look at every tick
     LATE = "LATE", ""  # a WAIT UNTIL has lasted too long
     PAUSE = "PAUSE", "N"  # seconds

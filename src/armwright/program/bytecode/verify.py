@@ -376,6 +376,7 @@ _RULES: Mapping[Op, Rule] = {
     Op.ELEM: _element,
     Op.MVON: _guard,
     Op.UNTIL: _until,
+    Op.AWAIT: lambda verifier, state: Flow(state, (verifier.targets[0], state)),
     Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,

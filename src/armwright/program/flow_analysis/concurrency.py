@@ -122,7 +122,10 @@ class _Events:
             names = (written_name(argument, scope) for argument in node.arguments)
             self.passed.update(array_name(name) for name in names if name)
         elif isinstance(node, tree.Signal | tree.Wait) and (name := written_name(node.event, scope)) is not None:
-            if isinstance(node, tree.Wait):
+            if isinstance(node, tree.Wait) and node.limit is not None:
+                # It may take a signal, or none.
+                self.passed.add(array_name(name))
+            elif isinstance(node, tree.Wait):
                 self.waits.setdefault(name, []).append((scope, node))
             else:
                 self.signals.setdefault(name, []).append(node)
@@ -155,7 +158,7 @@ class _Events:
 def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_EventStep]:
     """Yield the unconditional SIGNALs and WAITs, up to a HALT."""
     for node in statements:
-        if isinstance(node, tree.Signal | tree.Wait):
+        if isinstance(node, tree.Signal) or (isinstance(node, tree.Wait) and node.limit is None):
             if (name := written_name(node.event, scope)) is not None:
                 yield _EventStep(node, name)
         elif isinstance(node, tree.Block | tree.Lock):

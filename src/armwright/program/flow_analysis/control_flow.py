@@ -204,10 +204,22 @@ def end(context: Context, node: tree.Halt | tree.Retry) -> None:
     context.state.ended, context.state.end_span = True, node.span if is_valid else None
 
 
+def wait(context: Context, node: tree.Wait) -> None:
+    """Analyse a wait for an event."""
+    require_indices(context.state, node.event)
+    _late(context, node)
+
+
 def wait_until(context: Context, node: tree.WaitUntil) -> None:
-    """Analyse what may run where a condition does not hold in time."""
+    """Analyse a wait for a condition."""
+    require_value(context.state, node.condition)
+    _late(context, node)
+
+
+def _late(context: Context, node: tree.Wait | tree.WaitUntil) -> None:
+    """Analyse what may run where what is waited for does not come in time."""
     state = context.state
-    require_value(state, node.limit, node.condition)
+    require_value(state, node.limit)
     if node.otherwise is None:
         return
     if state.is_first_pass:
@@ -239,7 +251,7 @@ STEPS: Steps = {
     tree.For: for_,
     tree.Cobegin: cobegin,
     tree.Signal: lambda context, node: require_indices(context.state, node.event),
-    tree.Wait: lambda context, node: require_indices(context.state, node.event),
+    tree.Wait: wait,
     tree.WaitUntil: wait_until,
     tree.Pause: lambda context, node: require_value(context.state, node.duration),
     tree.Lock: lock,

@@ -173,7 +173,7 @@ def _branch(steps: Iterable[_Step], scope: Scope, *, without: Span | None = None
         node = step.node
         if without is not None and without.start <= node.span.start and node.span.end <= without.end:
             continue
-        if isinstance(node, tree.Signal | tree.Wait):
+        if isinstance(node, tree.Signal) or (isinstance(node, tree.Wait) and node.limit is None):
             name = written_name(node.event, step.scope) or _ANY
             events = branch.signals if isinstance(node, tree.Signal) else branch.waits
             # In a procedure an event may be a parameter.

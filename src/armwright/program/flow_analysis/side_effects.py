@@ -205,6 +205,7 @@ _CHILDREN: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
     tree.For: lambda node: (node.body,),
     tree.Lock: lambda node: (node.body,),
     tree.Repeat: lambda node: node.body,
+    tree.Wait: lambda node: () if node.otherwise is None else (node.otherwise,),
     tree.WaitUntil: lambda node: () if node.otherwise is None else (node.otherwise,),
     tree.Try: lambda node: (*node.body, *node.recovery),
     tree.Cobegin: lambda node: tuple(branch.body for branch in node.branches),

@@ -156,7 +156,7 @@ class _Layout:
         match node:
             case tree.Move():
                 self._move(node, column)
-            case tree.WaitUntil():
+            case tree.Wait() | tree.WaitUntil():
                 self._wait(node, column)
             case tree.If():
                 self._if(node, column)
@@ -187,7 +187,7 @@ class _Layout:
         """Lay out the statement behind THEN, ELSE or DO."""
         self._statement(node, column if isinstance(node, tree.Block) else column + INDENT)
 
-    def _wait(self, node: tree.WaitUntil, column: int) -> None:
+    def _wait(self, node: tree.Wait | tree.WaitUntil, column: int) -> None:
         if node.otherwise is not None:
             self._row(self._before(node.otherwise.span.start).start, column, comment_indent=INDENT)
             self._nested(node.otherwise, column)

@@ -125,11 +125,11 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "PRIORITY": (_COBEGIN, "Of branches that run at the same time, the one with the larger number is served first."),
     "SIGNAL": ("SIGNAL event", "Adds one to an event."),
     "WAIT": (
-        "WAIT event | WAIT UNTIL condition [WITHIN seconds [ELSE statement]]",
+        "WAIT event | UNTIL condition [WITHIN seconds [ELSE statement]]",
         "Waits until an event has been signalled, and takes one from it; or until a condition holds.",
     ),
     "WITHIN": (
-        "WAIT UNTIL condition WITHIN seconds [ELSE statement]",
+        "WAIT event | UNTIL condition WITHIN seconds [ELSE statement]",
         "The longest time of the wait; when it is over the statement runs, and without one it is an error.",
     ),
     "LOCK": ("LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."),

@@ -79,11 +79,18 @@ def event(context: Context, node: tree.Signal | tree.Wait) -> None:
     what = f"{type(node).__name__.upper()} needs an EVENT"
     advice = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
     require_type(context.names, node.event, ExpressionType.EVENT, "E223", what, advice=lambda _: advice)
+    if isinstance(node, tree.Wait):
+        _limit(context, node)
 
 
 def wait_until(context: Context, node: tree.WaitUntil) -> None:
     """Check condition, time and statement of a WAIT UNTIL."""
     require_condition(context.names, node.condition, "WAIT UNTIL")
+    _limit(context, node)
+
+
+def _limit(context: Context, node: tree.Wait | tree.WaitUntil) -> None:
+    """Check how long a wait may last, and what is done then."""
     if node.limit is not None and require_quantity(context.names, node.limit, "time", "WITHIN needs a time"):
         check_range(context.names, node.limit, "a time", zero=True)
     if node.otherwise is not None:

@@ -1,5 +1,7 @@
 """Parsing what decides what is done next: blocks, choices, loops, calls, branches side by side, events, recovery."""
 
+from typing import TypeVar
+
 from armwright.errors import closest
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
@@ -26,6 +28,7 @@ from armwright.program.syntax.statement_list import (
 )
 from armwright.program.syntax.token_stream import PanicModeError, TokenStream, describe_token
 
+_T = TypeVar("_T")
 _CONDITION = "a condition"
 _EVENT = "the name of an EVENT"
 _OPERANDS = (TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM)
@@ -402,7 +405,7 @@ def signal(tokens: TokenStream) -> tree.Signal:
     return tokens.node(tree.Signal, tokens.take(), variable(tokens, _EVENT, "after SIGNAL"))
 
 
-# "WAIT" lvalue | "WAIT" "UNTIL" expr [ "WITHIN" expr [ "ELSE" statement ] ]
+# "WAIT" ( lvalue | "UNTIL" expr ) [ "WITHIN" expr [ "ELSE" statement ] ]
 def wait(tokens: TokenStream) -> tree.Wait | tree.WaitUntil:
     """Read one WAIT."""
     start = tokens.take()
@@ -412,18 +415,26 @@ def wait(tokens: TokenStream) -> tree.Wait | tree.WaitUntil:
         text = tokens.current.text
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
         tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
-    return tokens.node(tree.Wait, start, variable(tokens, _EVENT, "after WAIT"))
+    event = variable(tokens, _EVENT, "after WAIT")
+    return tokens.node(tree.Wait, start, *_limited(tokens, start, event))
 
 
 def _wait_until(tokens: TokenStream, start: Token) -> tree.WaitUntil:
     condition = head_expression(tokens, _CONDITION, "after UNTIL", "WITHIN")
+    return tokens.node(tree.WaitUntil, start, *_limited(tokens, start, condition))
+
+
+def _limited(
+    tokens: TokenStream, start: Token, awaited: _T
+) -> tuple[Span, _T, tree.Expression | None, tree.Statement | None]:
+    """Read how long a wait may last, and what is done then; return it with the head and what is waited for."""
     limit = otherwise = None
     if tokens.accept_word("WITHIN"):
         limit = head_expression(tokens, "a number of seconds", "after WITHIN", "ELSE")
     head = tokens.span_since(start)
     if limit is not None and _accept_else(tokens):
         otherwise = nested_statement(tokens, "ELSE")
-    return tokens.node(tree.WaitUntil, start, head, condition, limit, otherwise)
+    return head, awaited, limit, otherwise
 
 
 # "PAUSE" expr

@@ -284,9 +284,12 @@ class Signal(Node):
 
 @attrs.frozen
 class Wait(Node):
-    """``WAIT event``."""
+    """``WAIT event [WITHIN seconds [ELSE statement]]``; ``head`` reaches up to ELSE."""
 
+    head: Span
     event: Variable
+    limit: "Expression | None" = None
+    otherwise: "Statement | None" = None
 
 
 @attrs.frozen

@@ -20,7 +20,7 @@ from armwright.program.vm.process import (
     WaitReason,
 )
 from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
-from armwright.program.vm.wait_until import too_late, wait_until
+from armwright.program.vm.wait_until import too_late, wait_until, wait_within
 
 # A time this part of a period behind a tick is on it.
 _ROUNDING = 1e-9
@@ -253,6 +253,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.QUIT: _quit,
     Op.SIG: signal,
     Op.WAIT: wait,
+    Op.AWAIT: wait_within,
     Op.UNTIL: wait_until,
     Op.LATE: too_late,
     Op.PAUSE: _pause,

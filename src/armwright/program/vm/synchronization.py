@@ -14,6 +14,8 @@ def signal(machine: Machine, process: Process, step: Instruction) -> None:
     for other in machine.state.processes:
         if other.waiting and other.waiting.kind == "event" and name in other.waiting.names:
             other.waiting, other.wake_tick = None, machine.state.ticks
+        elif (limited := other.unfulfilled_wait) and limited.deadline is not None and name in limited.names:
+            other.wake_tick = machine.state.ticks
     machine.hardware.note_event(name)
     machine.record_effect(process, "SIGNAL", f"SIGNAL {machine.spelling(name)}", step.span, data={"event": name})
 
