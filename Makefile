@@ -81,6 +81,9 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/python examples/tracked_points.py out
 	$(BIN)/armwright calibrate puma560-seed examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[identification]'
+	$(BIN)/python examples/logged_motion.py out
+	$(BIN)/armwright identify puma560 examples/puma_log.csv --check examples/puma_check.csv -o out/identified
 
 docs: gallery site  ## Build the site of the documentation into site/, its gallery made anew (the first time 4 minutes)
 
@@ -125,7 +128,7 @@ fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes und
 versions:         ## Write constraints.txt from the newest versions of everything, to be tested then
 	rm -rf build/versions && $(PYTHON) -m venv build/versions
 	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --editable \
-	    '.[test,urdf,docs,bench,online,optimal,sweep,clearance,calibration,cad,physics,planning,lsp]'
+	    '.[test,urdf,docs,bench,online,optimal,sweep,clearance,calibration,identification,cad,physics,planning,lsp]'
 	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --no-deps 'pybotics>=3.0,<4'
 	sed -n '/^#/p' constraints.txt > build/constraints.txt
 	build/versions/bin/python -m pip --disable-pip-version-check freeze --exclude-editable >> build/constraints.txt

@@ -18,7 +18,7 @@ def study(
     name: Annotated[
         str,
         Argument(
-            help="Name of the study: stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
+            help="Name of the study: stanford-torque, puma-moves, five-bar-clearance, dh-calibration, identified-arm.",
             autocompletion=listed_in("armwright.study.study", "STUDIES"),
         ),
     ],
@@ -41,6 +41,9 @@ def study(
 
     dh-calibration: a three-joint arm touches a board of 33 points in three orientations; the thesis' calibration of its
     Denavit-Hartenberg table and a complete model, both validated at six points (table 2.4).
+
+    identified-arm: an arm is logged in a cell with physics, identified from its log, and tracks another motion with
+    what its drawing says, what was identified, and the truth (simulated; extra `identification`).
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """

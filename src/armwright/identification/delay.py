@@ -8,6 +8,7 @@ import attrs
 
 from armwright.identification.equations import equations
 from armwright.identification.fitting import summed, weighted
+from armwright.identification.friction import without_dry
 from armwright.identification.log import Log
 from armwright.identification.model import DynamicModel
 from armwright.identification.signals import Preparation, motions
@@ -30,7 +31,8 @@ def with_delay(model: DynamicModel, logs: Sequence[Log], preparation: Preparatio
     size = preparation.decimation
     values = weighted(summed(equations(model, motions(logs, preparation), size))).values
     for _ in range(_MAX_STEPS):
-        step = weighted(summed(equations(model, motions(logs, preparation), size, values=values))).values
+        smooth = without_dry(model, values)
+        step = weighted(summed(equations(model, motions(logs, preparation), size, values=smooth))).values
         preparation = attrs.evolve(preparation, delay=preparation.delay + float(step[-1]))
         values = step[:-1]
         if abs(step[-1]) < _FOUND * logs[0].period:

@@ -51,8 +51,8 @@ def equations(
         model: of the arm.
         motions: of it.
         decimation: readings that are averaged to one equation.
-        values: (b,) base parameters; then one more column is the rate of the efforts that they predict, whose
-            coefficient is how much later positions were read than efforts [s].
+        values: (b,) base parameters, of what has no jumps; then one more column is the rate of the efforts that they
+            predict, whose coefficient is how much later positions were read than efforts [s].
     """
     for motion in motions:
         count = len(motion.t) // decimation

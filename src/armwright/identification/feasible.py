@@ -122,9 +122,14 @@ def possible_bodies(
     ]
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_threads = False, 1
-    P, A = sparse.csc_matrix(np.triu(quadratic)), rows.matrix(len(linear))
-    solution = clarabel.DefaultSolver(P, linear, A, np.array(rows.right), cones, settings).solve()
-    if str(solution.status) not in ("Solved", "AlmostSolved"):
+    A, right = rows.matrix(len(linear)), np.array(rows.right)
+    # By the largest curvature the program is of the size that the solver likes best; rarely another helps.
+    for scale in (1 / max(float(quadratic.diagonal().max()), 1.0), 1e-2, 1.0):
+        P = sparse.csc_matrix(np.triu(scale * quadratic))
+        solution = clarabel.DefaultSolver(P, scale * linear, A, right, cones, settings).solve()
+        if str(solution.status) in ("Solved", "AlmostSolved"):
+            break
+    else:
         raise ContradictionError(
             f"no set of bodies explains the measurements: the semidefinite program ended with {solution.status}; are "
             "the units, the gains and the order of the joints right?"

@@ -231,6 +231,20 @@ def robust(blocks: Iterable[Equations], start: Fit | None = None) -> Fit:
     return _with_errors(blocks, values, sigma, fit)
 
 
+def weighted_errors(blocks: Iterable[Equations], sigma: Array) -> Fit:
+    """Return the parameters by least squares with given weights, and their errors as ``robust`` has them.
+
+    Args:
+        blocks: equations, which are gone through several times.
+        sigma: (n,) standard deviations of the residuals of the joints [N m] or [N].
+
+    Raises:
+        TooFewError: there are fewer equations than parameters.
+    """
+    fit = _of_sums(summed(blocks), sigma)
+    return _with_errors(blocks, fit.values, fit.sigma, fit)
+
+
 def _weights(residuals: Array, sigma: Array, usable: Flags) -> Array:
     """Return Huber's weights of equations (k, n)."""
     beyond = np.abs(residuals) / sigma

@@ -70,6 +70,15 @@ def predicted(model: DynamicModel, values: Array, motion: Motion, slow: Array, h
     return np.asarray(smooth + np.where(stopped, held, 1.0) * dry)
 
 
+def without_dry(model: DynamicModel, values: Array) -> Array:
+    """Return base parameters (b,) without dry friction, whose rate is 0 but for the moments at which it jumps."""
+    return np.where(_is_dry(model), 0.0, values)
+
+
+def _is_dry(model: DynamicModel) -> Flags:
+    return np.array([name.rstrip("0123456789").removeprefix("coupled_") in _DRY for name in model.base.names])
+
+
 def held_share(model: DynamicModel, values: Array, motions: Iterable[Motion], slow: Array) -> float:
     """Return the share of dry friction, 0 to 1, that joints keep when they have stopped between motions.
 
@@ -94,7 +103,7 @@ def _parts(model: DynamicModel, values: Array, motion: Motion, slow: Array) -> t
     stopped = np.stack([_long_runs(column, least) for column in rest.T], axis=1)
     latest = np.maximum.accumulate(np.where(rest, -1, np.arange(len(rest))[:, None]), axis=0)
     came = np.sign(np.take_along_axis(motion.qd, np.maximum(latest, 0), axis=0)) * (latest >= 0)
-    is_dry = np.array([name.rstrip("0123456789") in _DRY for name in model.base.names])
+    is_dry = _is_dry(model)
     smooth = model.base_columns(motion.q, motion.qd, motion.qdd) @ np.where(is_dry, 0.0, values)
     speed = np.where(rest, came * _CREEP, motion.qd)
     dry = model.base_columns(motion.q, speed, motion.qdd) @ np.where(is_dry, values, 0.0)

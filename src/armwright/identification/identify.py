@@ -21,9 +21,10 @@ from armwright.identification.delay import with_delay
 from armwright.identification.equations import equations
 from armwright.identification.feasible import feasible
 from armwright.identification.fitting import Fit, Sums, robust, summed, weighted
-from armwright.identification.friction import LAWS, Law, held_share
+from armwright.identification.friction import LAWS, Law, held_share, without_dry
 from armwright.identification.identifiability import weak_parameters
-from armwright.identification.log import Log
+from armwright.identification.log import LEAST_SAMPLES, Log
+from armwright.identification.misfit import friction_misfits
 from armwright.identification.model import DynamicModel
 from armwright.identification.result import Choice, Identification, Prediction, predict
 from armwright.identification.signals import BORDER, Motion, Preparation, cut, motions, preparation_of
@@ -104,6 +105,7 @@ def identify(
     fit, delay_error, sums, all_motions = run.fit(model, preparation)
     warnings += effort_warnings(arm, all_motions)
     refuse_reversed(model, fit.values, fit.errors)
+    warnings += friction_misfits(model, fit, preparation, all_motions)
     held = held_share(model, fit.values, all_motions, preparation.slow)
     report("finding bodies")
     standard = None
@@ -175,7 +177,8 @@ class _Run:
     def _folds_of(self, model: DynamicModel, preparation: Preparation) -> list[Sums]:
         """Return the sums of equations of each fold."""
         total = sum(log.t[-1] - log.t[0] for log in self._logs)
-        seconds = max(_LEAST_BLOCK + 2 * preparation.border, total / (self._folds * _BLOCKS_PER_FOLD * len(self._logs)))
+        least = max(_LEAST_BLOCK, (LEAST_SAMPLES + 10) * self._logs[0].period)
+        seconds = max(least + 2 * preparation.border, total / (self._folds * _BLOCKS_PER_FOLD * len(self._logs)))
         blocks = [block for log in self._logs for block in cut(log, seconds)]
         found = []
         for fold in range(self._folds):
@@ -193,10 +196,16 @@ class _Run:
             return preparation, []
         # All by the same scale, else each would be as good as its own residuals.
         sigma = weighted(_total(folds[0])).sigma
-        errors = [float(_held_out(each, sigma).mean()) for each in folds]
-        best = int(np.argmin(errors))
+        errors = [_held_out(each, sigma) for each in folds]
+        best = int(np.argmin([error.mean() for error in errors]))
+        # The lowest that is as good: what is above tells nothing, and noise is there.
+        for k in range(best):
+            loss = errors[k] - errors[best]
+            if loss.mean() < _WORTH * loss.std(ddof=1) / np.sqrt(len(loss)):
+                best = k
+                break
         choices = [
-            Choice("filter", f"{each.cutoff:.3g} Hz", float(np.sqrt(error)), i == best)
+            Choice("filter", f"{each.cutoff:.3g} Hz", float(np.sqrt(error.mean())), i == best)
             for i, (each, error) in enumerate(zip(tried, errors, strict=True))
         ]
         chosen = tried[best].cutoff
@@ -243,7 +252,7 @@ class _Run:
         """Return the fit to all logs, the error of the delay, the sums of its equations, and the motions."""
         all_motions = list(motions(self._logs, preparation))
         start = weighted(summed(equations(model, all_motions, preparation.decimation)))
-        blocks = list(equations(model, all_motions, preparation.decimation, values=start.values))
+        blocks = list(equations(model, all_motions, preparation.decimation, values=without_dry(model, start.values)))
         fit = robust(blocks)
         sums = summed(blocks, fit)
         own = range(len(fit.values) - 1)

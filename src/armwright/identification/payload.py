@@ -13,9 +13,10 @@ from armwright.arm.model import Arm, Link
 from armwright.arrays import Array, ArrayLike, read_only
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.bodies import Body, in_previous_frame
+from armwright.dynamics.identification import independent_columns
 from armwright.dynamics.payloads import payload
 from armwright.dynamics.regressors import OF_LINK
-from armwright.errors import ContradictionError
+from armwright.errors import ContradictionError, UnsupportedArmError
 from armwright.files.result_table import ResultTable
 from armwright.identification.equations import equations
 from armwright.identification.feasible import Measured, ball, link_of, possible_bodies
@@ -28,6 +29,8 @@ from armwright.identification.signals import Preparation, motions, preparation_o
 _CHANGED = ("viscous", "coulomb", "offset")
 # The ball that a load is likened to weighs as little as this in squared standard deviations: it only keeps it possible.
 _WEIGHT = 1e-2
+# States that show what motions tell.
+_STATES = 50
 _PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
@@ -153,12 +156,14 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
     Raises:
         MissingExtraError: Clarabel is not installed.
         TooFewError: too little motion is left.
+        UnsupportedArmError: no motion of the arm tells all of a load.
         ContradictionError: the efforts ask for a load of less than nothing.
     """
     n = arm.n
     model = DynamicModel(arm=arm, terms=_CHANGED)
     changes = tuple(f"{term}{i}" for i in range(1, n + 1) for term in _CHANGED)
     loaded = LoadedModel(model=model, of_arm=changes)
+    _refuse_hidden(loaded)
     logs = [log.moving() for log in logs]
     preparation = preparation or preparation_of(logs)
     without = compile_arm(arm).inverse_dynamics
@@ -180,3 +185,21 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
     body = Measured(combinations=np.eye(len(fit.values)), sums=summed(blocks, fit), sigma=fit.sigma)
     values, _ = possible_bodies(body, [ball(mass)], [], weight=_WEIGHT)
     return Payload(arm=arm, load=link_of(values[:OF_LINK]), fit=fit, changes=values[OF_LINK:].reshape(n, len(_CHANGED)))
+
+
+def _refuse_hidden(loaded: LoadedModel) -> None:
+    """Refuse an arm whose motions cannot tell a load.
+
+    Raises:
+        UnsupportedArmError: a parameter of the load has no effect, or that of others.
+    """
+    n = loaded.model.arm.n
+    q, qd, qdd = np.random.default_rng(0).uniform(-3, 3, size=(3, _STATES, n))
+    columns, _ = independent_columns(
+        loaded.base_columns(q, qd, qdd)[:, :, -OF_LINK:].reshape(-1, OF_LINK), range(OF_LINK)
+    )
+    hidden = [name for k, name in enumerate(_PARAMETERS) if k not in columns]
+    if hidden:
+        raise UnsupportedArmError(
+            f"arm '{loaded.model.arm.name}': its motions do not tell {', '.join(hidden)} of a load apart from the rest"
+        )

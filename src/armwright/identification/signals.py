@@ -31,6 +31,9 @@ BORDER = 1.0
 # A joint slower than this part of its greatest speed may stick, and tells nothing of its friction; so may one whose
 # speed is no more than so many standard deviations of its noise.
 _DEAD_BAND, _NOISE = 0.005, 3.0
+# Below a frequency lies this part of the power of velocities; reversals of friction reach so many times as far. What is
+# above tells nothing of an arm, and noise there makes columns too large, so that parameters come out too small.
+_POWER, _REVERSALS = 0.999, 40.0
 # Readings of a log that a cut-off is chosen by.
 _SHOWN = 4096
 
@@ -67,11 +70,12 @@ def preparation_of(logs: Sequence[Log], *, cutoff: float | None = None, decimati
 
     Args:
         logs: of one arm, sampled alike.
-        cutoff: of the filter [Hz]; by ``white_cutoff`` when left out.
+        cutoff: of the filter [Hz]; when left out by ``white_cutoff``, but not far above the motion.
         decimation: readings that are averaged to one equation; when left out, as many as half a period of the cut-off
             frequency has.
     """
-    cutoff = white_cutoff(logs) if cutoff is None else cutoff
+    if cutoff is None:
+        cutoff = min(white_cutoff(logs), _REVERSALS * _motion_frequency(logs))
     if decimation is None:
         decimation = max(1, int(1 / (2 * cutoff * logs[0].period)))
     slow = np.zeros(logs[0].n)
@@ -198,6 +202,20 @@ def white_cutoff(logs: Sequence[Log]) -> float:
             score, count = score + float((correlations**2).sum()), count + taken.shape[1]
         scores.append(score / max(count, 1))
     return float(_TRIED[int(np.argmin(scores))] * rate)
+
+
+def _motion_frequency(logs: Sequence[Log]) -> float:
+    """Return the frequency below which nearly all power of the velocities lies [Hz]."""
+    highest = 0.0
+    for log in logs:
+        for piece in log.pieces():
+            rate = 1 / piece.period
+            power = np.abs(np.fft.rfft(np.gradient(piece.q, piece.period, axis=0), axis=0)) ** 2
+            # Each joint by its own power, or the fastest alone would count.
+            part = np.cumsum((power / np.maximum(power.sum(axis=0), np.finfo(float).tiny)).mean(axis=1))
+            index = int(np.searchsorted(part, _POWER * part[-1])) + 1
+            highest = max(highest, index * rate / len(piece.t))
+    return highest
 
 
 def _autocorrelations(values: Array, lags: int) -> Array:
