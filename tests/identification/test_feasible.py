@@ -44,10 +44,10 @@ def test_exact_measurements_of_an_exact_drawing_leave_it_as_it_is(rng: np.random
     found = arm_of(model, feasible(model, sums, np.ones(4)).values)
 
     for link, expected in zip(found.links, arm.links, strict=True):
-        assert link.mass == pytest.approx(expected.mass, rel=1e-3)
-        np.testing.assert_allclose(link.com, expected.com, atol=1e-3)
-        np.testing.assert_allclose(link.inertia, expected.inertia, atol=1e-3)
-    assert found.motor_values("inertia") == pytest.approx(arm.motor_values("inertia"), abs=1e-3)
+        assert link.mass == pytest.approx(expected.mass, rel=1e-2)
+        np.testing.assert_allclose(link.com, expected.com, atol=1e-2)
+        np.testing.assert_allclose(link.inertia, expected.inertia, atol=1e-2)
+    assert found.motor_values("inertia") == pytest.approx(arm.motor_values("inertia"), abs=1e-2)
 
 
 def test_bodies_are_possible_whatever_is_measured(sample: Sample) -> None:

@@ -157,7 +157,8 @@ class Fit:
     @property
     def errors(self) -> Array:
         """(b,) standard errors of the parameters."""
-        return np.sqrt(self.covariance.diagonal())
+        # Rounding puts variances of next to nothing below 0.
+        return np.sqrt(np.maximum(self.covariance.diagonal(), 0.0))
 
 
 def ordinary(sums: Sums) -> Fit:
@@ -195,7 +196,9 @@ def _of_sums(sums: Sums, sigma: Array) -> Fit:
     squares = sums.squares(values)
     # Parameters make residuals smaller, those of each joint by its share.
     own = np.maximum(sums.counts * (1 - b / total), 1.0)
-    floor = 1e-12 * np.maximum(sums.products[:, b, b], np.finfo(float).tiny)
+    efforts = sums.products[:, b, b]
+    # A joint without effort is known to what can be told beside the others.
+    floor = 1e-12 * np.maximum(efforts, 1e-12 * efforts.max() or 1.0)
     new = np.sqrt(np.maximum(squares, floor) / own)
     scale = float((weights * squares).sum() / (total - b))
     return Fit(values=values, covariance=scale * inverse, sigma=new, counts=sums.counts, normal=N[:b, :b])
@@ -203,11 +206,15 @@ def _of_sums(sums: Sums, sigma: Array) -> Fit:
 
 def _inverse(N: Array) -> Array:
     """Return the inverse of normal equations."""
-    lengths = np.sqrt(np.maximum(N.diagonal(), np.finfo(float).tiny))
+    squares = N.diagonal()
+    # A column of zeros has no length of its own; it is as far below the others as numbers that are rounded.
+    lengths = np.sqrt(np.maximum(squares, max(1e-24 * squares.max(), np.finfo(float).tiny)))
     sizes, vectors = np.linalg.eigh(N / np.outer(lengths, lengths))
     # What is not excited keeps a variance, a very large one.
     sizes = np.maximum(sizes, _SINGULAR**2 * sizes[-1])
-    return np.asarray((vectors / sizes) @ vectors.T / np.outer(lengths, lengths))
+    # A matrix times its transpose has no variance below 0.
+    half = vectors / np.sqrt(sizes) / lengths[:, None]
+    return np.asarray(half @ half.T)
 
 
 def robust(blocks: Iterable[Equations], start: Fit | None = None) -> Fit:
