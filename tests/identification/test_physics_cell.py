@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.model import Arm
 from armwright.dynamics.regressors import dynamic_parameters
-from armwright.errors import UnsupportedArmError
+from armwright.errors import ContradictionError, UnsupportedArmError
 from armwright.identification import DynamicModel, identify, identify_payload
 from armwright.identification.friction import LAWS
 from identification.closed_loop import believed, excitation, logged, random_arm, with_load
@@ -30,7 +30,7 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
 
     Where friction has the form that is fitted, base parameters are within three standard errors in 99 of 100 cases, and
     intervals of 90 % hold 86 to 94 of 100. Where it has another, that is said. All bodies are possible, and a load of
-    two kilogrammes is found to one per cent.
+    two kilogrammes is found to one per cent, where three of its standard errors are no more.
     """
     scores: list[float] = []
     said, others, hidden, loads, smallest = 0, 0, 0, [], np.inf
@@ -51,16 +51,22 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
         assert found.arm is not None
         try:
             loaded = logged(drawn, with_load(arm, LOAD), motion, rng)
-            loads.append(identify_payload(found.arm, [loaded], found.preparation).load.mass / LOAD - 1)
-        except UnsupportedArmError:
-            # Short arms, whose axes lie so that no motion tells the mass.
+            load = identify_payload(found.arm, [loaded], found.preparation)
+        except (ContradictionError, UnsupportedArmError):
+            # Short arms, whose axes lie so that motions tell little of the mass, or nothing.
+            hidden += 1
+            continue
+        # A mass that is told to be known worse is no claim of one per cent.
+        if 3 * load.mass_error < 0.01 * LOAD:
+            loads.append(load.load.mass / LOAD - 1)
+        else:
             hidden += 1
     z = np.abs(scores)
     inside, covered = float((z < 3).mean()), float((z < 1.645).mean())
     sample.record(
         "base parameters of random arms in the physics cell", len(z), int((z >= 3).sum()),
         within_three_errors=inside, covered_by_90=covered, misfits_said=f"{said} of {others}",
-        loads=len(loads), worst_load=float(np.abs(loads).max(initial=0.0)), smallest=smallest,
+        loads=f"{len(loads)}, hidden {hidden}", worst_load=float(np.abs(loads).max(initial=0.0)), smallest=smallest,
     )  # fmt: skip
     # Of a few arms, chance leaves more room than of a hundred.
     room = 0.0 if sample.whole else 0.06
