@@ -180,6 +180,13 @@ def test_torque_by_cause() -> None:
     assert f"{data['gravity'][1]:.4f}" in table
 
 
+def test_torque_without_masses() -> None:
+    """Zeros of an arm whose masses nobody published are told apart from those of an arm that needs no effort."""
+    said = [armwright("torque", arm, "-q", Q_DEG).stderr for arm in ("irb140", "puma560")]
+
+    assert said == ["armwright: note: irb140 has no masses: its own efforts are zero below\n", ""]
+
+
 def test_rows_of_a_file(tmp_path: Path) -> None:
     """The rows of a CSV file with the columns of motion.csv give one answer each."""
     names = [f"{quantity}{i}" for quantity in ("q", "qd", "qdd") for i in range(1, 7)]

@@ -17,9 +17,11 @@ from armwright.compiled.arm import compile_arm
 from armwright.compiled.quantities import quantity_names
 from armwright.compiled.source_check import check_text
 from armwright.compiled.source_text import Language, arm_functions, source_text
+from armwright.dynamics.inertia_matrix import massless_joint
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.closed_forms import closed_form_of
 from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.emit import Emitted, emit
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
@@ -64,9 +66,24 @@ def with_slides(rng: np.random.Generator) -> Arm:
 
 
 def quantities_of(arm: Arm, *, real: str = "double") -> list[str]:
-    """Return the quantities that an arm has: one with random axes has no closed form, and float has none either."""
-    closed_form = arm.name != "random" and real == "double"
-    return [name for name in quantity_names() if closed_form or name != "inverse_branches"]
+    """Return the quantities that an arm has.
+
+    One with random axes has no closed form, and float has none either; an arm of the catalogue whose masses nobody
+    published has no accelerations.
+    """
+    missing = {"inverse_branches"} if real == "float" or not has_closed_form(arm) else set()
+    if massless_joint(arm) is not None:
+        missing |= {"forward_dynamics", "forward_dynamics_derivatives"}
+    return [name for name in quantity_names() if name not in missing]
+
+
+def has_closed_form(arm: Arm) -> bool:
+    """Return whether the inverse kinematics of an arm has a closed form."""
+    try:
+        closed_form_of(arm)
+    except UnsupportedArmError:
+        return False
+    return True
 
 
 def inputs_of(arm: Arm, quantity: str, rows: int, rng: np.random.Generator) -> list[Array]:
@@ -213,6 +230,13 @@ def test_test_programs(compiler: str, real: Real, tmp_path: Path, rng: np.random
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, ""), done.stdout
     assert done.stdout.count("0 of 20 refused") == len(names)
+
+
+def test_no_accelerations_without_masses() -> None:
+    """A text of accelerations is refused for an arm without masses: it could refuse each row only."""
+    for name in ("forward_dynamics", "forward_dynamics_derivatives"):
+        with pytest.raises(UnsupportedArmError, match="joint 6 moves no mass and has no finite acceleration; specify"):
+            source_text(load_arm("irb140"), [name], "c")
 
 
 def test_test_program_finds_an_error(tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ from typing import Literal, TypeAlias
 from armwright.arm.model import Arm
 from armwright.compiled.arm import CompiledArm
 from armwright.compiled.quantities import emit_quantity
-from armwright.errors import InvalidValueError
+from armwright.dynamics.inertia_matrix import massless_joint
+from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.tracing.emit_c import Argument, Function, Real, c_header, cpp_header
 from armwright.tracing.emit_cuda import cuda_source
 from armwright.tracing.identifiers import identifier
@@ -23,6 +24,8 @@ Language: TypeAlias = Literal["c", "cpp", "cuda"]
 
 # What is small there is small for double: see ``kinematics.inverse_kinematics.branches.REACH_TOLERANCE``.
 _FOR_DOUBLE = frozenset({"inverse_branches"})
+# What has no value where a joint moves nothing.
+_FOR_MASSES = frozenset({"forward_dynamics", "forward_dynamics_derivatives"})
 # From so many joints on the loops over links stay loops in the text: a controller has little room for code.
 _LOOPS_FROM = 9
 _ASCII = str.maketrans({"²": "^2", "³": "^3", "·": "*", "…": "...", "–": "-", "°": " deg"})
@@ -78,6 +81,11 @@ def arm_functions(arm: Arm, quantities: Sequence[str], language: Language, real:
         if real == "float" and name in _FOR_DOUBLE:
             raise InvalidValueError(
                 f"real: expected double for {name}, got float, whose digits do not tell what is in reach"
+            )
+        if name in _FOR_MASSES and (joint := massless_joint(arm)) is not None:
+            raise UnsupportedArmError(
+                f"arm '{arm.name}': no {name}, for joint {joint + 1} moves no mass and has no finite acceleration; "
+                f"specify mass and inertia of link {joint + 1}, or the inertia of its motor"
             )
     prefix = identifier(arm.name, otherwise="arm")
     # Both types may be included in one program of C, where functions of one name cannot differ in their arguments.

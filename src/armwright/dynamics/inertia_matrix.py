@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
@@ -12,6 +14,11 @@ from armwright.dynamics.drives import with_rotors
 from armwright.dynamics.joint_frames import JointBody, at_previous_joint, combined, joint_body, joint_steps
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector, add, cross, dot
+
+# A configuration in which every arm shows that a joint moves nothing.
+_BENT = 0.3
+# A joint that moves less inertia than this part of the largest moves nothing.
+_NOTHING = 1e-12
 
 
 def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
@@ -77,6 +84,22 @@ def mass_matrix(arm: Arm, q: ArrayLike, *, drives: bool = True) -> Array:
     lead, (q_,), _ = batch(arm, q=q)
     M = composite_rigid_body(arm, q_)
     return stack_matrix(with_rotors(arm, M) if drives else M, lead)
+
+
+def massless_joint(arm: Arm) -> int | None:
+    """Return the index of a joint that moves no mass, which an effort accelerates without bound; None if each moves one.
+
+    Args:
+        arm: the arm, with n joints.
+
+    Raises:
+        UnsupportedArmError: the mass of a link is unknown.
+    """
+    moved = np.linalg.eigvalsh(mass_matrix(arm, np.full(arm.n, _BENT)))
+    if moved[0] > _NOTHING * max(float(moved[-1]), np.finfo(float).tiny):
+        return None
+    bodies = zip(arm.links, arm.motors, strict=True)
+    return max((i for i, (link, motor) in enumerate(bodies) if not link.mass + motor.inertia), default=arm.n - 1)
 
 
 def inverse_of_mass(arm: Arm, M: Matrix) -> tuple[Matrix, list[Pivot]]:

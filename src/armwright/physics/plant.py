@@ -29,10 +29,6 @@ from armwright.spatial.poses import inverse
 
 # What MuJoCo's compiler takes as the least [kg], [kg m²].
 _LEAST_MASS, _LEAST_MOMENT = 1e-6, 1e-6
-# A configuration in which every arm shows that a joint moves nothing.
-_BENT = 0.3
-# A joint that moves less inertia than this part of the largest moves nothing.
-_NOTHING = 1e-12
 
 
 class Inertia(NamedTuple):
@@ -270,15 +266,11 @@ def refuse_massless(arm: Arm) -> None:
     Raises:
         UnsupportedArmError: there is one; its link is named.
     """
-    from armwright.dynamics.inertia_matrix import mass_matrix  # noqa: PLC0415 - of worlds only
+    from armwright.dynamics.inertia_matrix import massless_joint  # noqa: PLC0415 - of worlds only
 
-    moved = np.linalg.eigvalsh(mass_matrix(arm, np.full(arm.n, _BENT)))
-    if moved[0] > _NOTHING * max(float(moved[-1]), np.finfo(float).tiny):
+    number = massless_joint(arm)
+    if number is None:
         return
-    empty = [
-        i for i, (link, motor) in enumerate(zip(arm.links, arm.motors, strict=True)) if not link.mass + motor.inertia
-    ]
-    number = max(empty, default=arm.n - 1)
     name = f" ('{arm.links[number].name}')" if arm.links[number].name else ""
     raise UnsupportedArmError(
         f"arm '{arm.name}': no physics, for joint {number + 1} moves no mass: specify mass and inertia of link "

@@ -122,6 +122,8 @@ def _body(function: Function) -> Iterator[str]:
     if staged:
         yield "__syncthreads();"
         yield "const volatile double *const again = tile;"
+        # Zeros need no input: the efforts of an arm without masses.
+        yield "(void)again;"
     writer, names = Writer(_DIALECT), dict[int, str]()
     results = iter(code.outputs)
     ends = [x for x in (code.invalid, code.unusual) if x is not None]
