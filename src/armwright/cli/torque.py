@@ -48,9 +48,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
 
     model = load_arm(arm)
     if not any(link.mass or link.inertia.any() for link in model.links):
-        print(
-            f"armwright: note: {model.name} has no masses: its own efforts are zero below", file=sys.stderr
-        )
+        print(f"armwright: note: {model.name} has no masses: its own efforts are zero below", file=sys.stderr)
     body = Link() if load is None else read_payload(load)
     tool_wrench = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, (q, qd, qdd), table_file(csv, columns, skip_incomplete=skip_incomplete))

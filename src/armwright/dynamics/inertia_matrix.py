@@ -87,7 +87,7 @@ def mass_matrix(arm: Arm, q: ArrayLike, *, drives: bool = True) -> Array:
 
 
 def massless_joint(arm: Arm) -> int | None:
-    """Return the index of a joint that moves no mass, which an effort accelerates without bound; None if each moves one.
+    """Return the index of a joint that moves no mass, which efforts accelerate without bound; None if there is none.
 
     Args:
         arm: the arm, with n joints.
