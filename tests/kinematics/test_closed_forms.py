@@ -69,6 +69,7 @@ BUILDS: dict[str, tuple[str, list[Joint]]] = {
     **{f"{pair}, {k} more": ("Wristed", [*joints, *WRIST[:k]]) for pair, joints in PAIRS.items() for k in range(4)},
     **{f"three parallel, {k} more": ("ThreeParallel", [*PARALLEL, *ROLLS[:k]]) for k in (1, 2)},
     "backwards": ("Backwards", BACKWARDS),
+    "backwards, 4 joints": ("Backwards", BACKWARDS[:4]),
     **{f"scara {order}": ("Scara", _scara(order)) for order in ("RRPR", "RRRP", "PRRR", "RPRR")},
     "swivelling": ("Swivelling", list(iiwa14().joints)),
     "held": ("Locked", list(panda().joints)),
@@ -398,6 +399,17 @@ def test_a_line_of_five_joints_keeps_its_branch() -> None:
     assert move.certificate.holds
     end = move.trajectory(move.trajectory.duration)
     np.testing.assert_allclose(forward(arm, end), ahead, atol=1e-6)
+
+
+def test_a_joint_that_every_pose_leaves_open_is_no_closed_form(rng: np.random.Generator) -> None:
+    """Three axes that meet, and two more that do not: the first joint is no answer to where they meet, which stays."""
+    rows = [(0.3, 0.0, 0.8), (0.0, 0.0, 0.9), (0.35, 0.08, 1.2), (0.1, 0.0, 0.7), (0.2, 0.1, 0.3)]
+    arm = Arm(name="shoulder", joints=[_joint(*row) for row in rows])
+    assert find_closed_form(arm) is None
+    for q in random_configurations(arm, rng, 5):
+        solution = inverse(arm, forward(arm, q))
+        assert solution.outcome is Outcome.SOLVED
+        assert min(_turned_apart(arm, branch.q, q) for branch in solution) < 1e-4
 
 
 def test_words_of_a_swivel_are_for_seven_joints() -> None:

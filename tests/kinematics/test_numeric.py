@@ -226,6 +226,31 @@ def test_free_joints_of_a_singular_configuration() -> None:
     assert solution.best.q[2] + solution.best.q[3] == pytest.approx(0.9)
 
 
+@pytest.mark.parametrize("size", [0.01, 0.3, 10.0])
+def test_joints_that_do_the_same(size: float) -> None:
+    """Three slides of a telescope on a short arm, or two joints on one axis behind a long slide: the steps have an answer.
+
+    The damping is not lost beside what is large there.
+    """
+    slide = Joint(kind="prismatic")
+    telescope = [slide, slide, slide, Joint(kind="revolute", a=size, alpha=RIGHT)]
+    crane = [
+        Joint(kind="prismatic", a=0.17 * size, alpha=-RIGHT),
+        Joint(kind="revolute"),
+        Joint(kind="revolute", a=0.09 * size, alpha=RIGHT),
+        Joint(kind="revolute", alpha=0.765),
+        Joint(kind="prismatic", d=0.49 * size),
+    ]
+    for joints, free in ((telescope, (1, 2, 3)), (crane, (2, 3))):
+        arm = Arm(name="alike", joints=joints)
+        q = np.array([0.3, 0.2, -0.4, 0.5, 0.2])[: arm.n] * np.where(arm.revolute, 1.0, size)
+        solution = inverse(arm, forward(arm, q))
+
+        assert solution.outcome is Outcome.SINGULAR
+        assert all(set(free) <= set(branch.free) for branch in solution)
+        assert solution.best.position_error < RESIDUAL * max(size, 1.0)
+
+
 def test_a_stretched_arm_is_not_free(elbow: Arm) -> None:
     """Stretched out a planar arm of three joints has an idle motion to first order, and no second configuration."""
     three = attrs.evolve(

@@ -33,7 +33,7 @@ def find_closed_form(arm: Arm) -> ClosedForm | None:
 
     - a build of ``find_geometry``: with an elbow or a slide and a spherical wrist, or with three parallel axes;
     - three revolute joints of which two neighbours are parallel or meet, and as many more, up to three, whose axes meet
-      in one point; of six joints the first three may be those that meet instead;
+      in one point; of six joints, or of four, the first three may be those that meet instead;
     - a revolute joint, three parallel ones, and up to two more, whose axes meet;
     - three revolute joints and a slide, all parallel (SCARA);
     - seven joints: three whose axes meet, one, and three whose axes meet; or six with a closed form, before or after
@@ -70,7 +70,7 @@ def _forms(axes: Axes) -> Iterator[ClosedForm]:
         yield OfBuild(geometry=geometry)
     if axes.kinds == "R" * n and 3 <= n <= 6:
         yield from _wristed(axes)
-        if n == 6:
+        if n in (4, 6):
             other = _turned_over(axes)
             for forwards in _wristed(other):
                 choosers = tuple(n + 1 - joint for joint in reversed(forwards.choosers))
@@ -174,12 +174,14 @@ def _signs(count: int) -> tuple[tuple[Sign, ...], ...]:
 
 
 def _finds_again(arm: Arm, form: ClosedForm) -> bool:
-    """Whether a closed form finds configurations of its arm again."""
+    """Whether a closed form finds configurations of its arm again, and leaves no joint open there."""
     rng = np.random.default_rng(0)
     for q in rng.uniform(-1.0, 1.0, size=(_TRIED, arm.n)):
         X = forward(arm, q)
         near = q.tolist()
         found = form.branches(arm, X[:3, :3].tolist(), X[:3, 3].tolist(), near)
-        if not np.abs(np.array(found.q, dtype=float) - q).max(axis=1).min() < _FOUND:
+        # A joint that every pose leaves open would have its value from q, and be found by that alone.
+        again = np.abs(np.array(found.q, dtype=float) - q).max(axis=1) < _FOUND
+        if not (again & ~np.array(found.free, dtype=bool).any(axis=1)).any():
             return False
     return True

@@ -30,8 +30,10 @@ _WEIGHT, _POSITION_FIRST = 0.25, 1e-4
 _ROUNDING = 1e-15
 # A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
 _STILL = 1e-9
-# The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
+# The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds;
+# and the least, in parts of what it is added to, where it is not lost if two joints do the same.
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
+_LEAST_DAMPING = 1e-14
 # Joints that a pose takes.
 _POSE = 6
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
@@ -267,10 +269,11 @@ def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> 
     g = (np.swapaxes(J, -1, -2) @ e[..., None])[..., 0]
     locked = np.zeros(q.shape, dtype=bool)
     diagonal = np.arange(q.shape[-1])
+    damping = np.maximum(damping, _LEAST_DAMPING * np.maximum(H[:, diagonal, diagonal], task.size**2))
     step = np.zeros(q.shape)
     for _ in range(2):
         H_held = np.where(locked[:, :, None] | locked[:, None, :], 0.0, H)
-        H_held[:, diagonal, diagonal] += np.where(locked, 1.0, np.maximum(damping, _ROUNDING * task.size**2))
+        H_held[:, diagonal, diagonal] += np.where(locked, 1.0, damping)
         step = np.linalg.solve(H_held, np.where(locked, 0.0, g)[..., None])[..., 0]
         outwards = ((q <= lower) & (step < 0)) | ((q >= upper) & (step > 0))
         if not outwards.any():
