@@ -326,6 +326,21 @@ def test_five_joints_come_to_a_position_that_they_cannot_turn_to() -> None:
     assert "cannot turn its tool" in solution.explain()
 
 
+@pytest.mark.parametrize("turn", [1e-3, 1e-5, 4e-6])
+def test_what_is_out_of_reach_by_little_is_told(turn: float) -> None:
+    """A hand turned aside by less than the digits of the message: it says more of them, not 0.00 deg."""
+    arm = wx250()
+    X = forward(arm, [0.3, 0.2, 0.3, 0.4, 0.5])
+    X[:3, :3] = rotation_from_vector(np.array((0.0, 0.0, turn))) @ X[:3, :3]
+
+    solution = inverse(arm, X)
+
+    told = re.search(r"cannot turn its tool .* orientation is (\S+) deg away$", solution.explain())
+    assert told is not None
+    assert float(told[1]) == pytest.approx(np.degrees(solution.rotation_error), rel=0.5)
+    assert 0 < solution.rotation_error <= turn * 1.001
+
+
 @pytest.mark.parametrize("make", [cobra600, wx250])
 def test_typed_poses(make: Callable[[], Arm], rng: np.random.Generator) -> None:
     """A pose typed with six digits is none of the few that such an arm has, by less than counts, and is solved."""

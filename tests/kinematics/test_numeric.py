@@ -228,7 +228,7 @@ def test_free_joints_of_a_singular_configuration() -> None:
 
 @pytest.mark.parametrize("size", [0.01, 0.3, 10.0])
 def test_joints_that_do_the_same(size: float) -> None:
-    """Three slides of a telescope on a short arm, or two joints on one axis behind a long slide: the steps have an answer.
+    """Three slides of a telescope on a short arm, or two joints on one axis behind a slide: each step has an answer.
 
     The damping is not lost beside what is large there.
     """

@@ -18,7 +18,7 @@ from armwright.spatial.poses import position_text
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
 _AT_LIMIT = 1e-9
 # A nearest pose turned by less than this has the orientation that was asked for [rad].
-_SHOWN_TURN = 1e-5
+_SHOWN_TURN = 2e-6
 # A nearest pose moved by less than this is at the position that was asked for [m].
 _AT_POSITION = 1e-5
 
@@ -149,15 +149,16 @@ class InverseSolution:
 
     def explain(self) -> str:
         """Say in one sentence why no configuration can be taken."""
+        turned = _shown(math.degrees(self.rotation_error), 2)
         if self.outcome is Outcome.OUT_OF_REACH and self.rotation_error > _SHOWN_TURN and self.distance < _AT_POSITION:
             return (
                 f"'{self.arm.name}', an arm of {counted(self.arm.n, 'joint')}, cannot turn its tool to the pose: at "
-                f"this position the nearest orientation is {math.degrees(self.rotation_error):.2f} deg away"
+                f"this position the nearest orientation is {turned} deg away"
             )
         if self.outcome is Outcome.OUT_OF_REACH:
-            turned = f" and {math.degrees(self.rotation_error):.2f} deg" if self.rotation_error > _SHOWN_TURN else ""
+            also = f" and {turned} deg" if self.rotation_error > _SHOWN_TURN else ""
             return (
-                f"the pose is {self.distance * 1e3:.1f} mm{turned} out of reach of '{self.arm.name}'; "
+                f"the pose is {_shown(self.distance * 1e3, 1)} mm{also} out of reach of '{self.arm.name}'; "
                 f"the nearest in reach has its origin at {position_text(self.nearest_pose[:3, 3])}"
             )
         least = min(self.branches, key=lambda branch: max((fault.excess for fault in branch.violations), default=0.0))
@@ -169,6 +170,12 @@ class InverseSolution:
         columns = ("branch", *(f"q{number}" for number in range(1, self.arm.n + 1)), "outside its limits")
         rows = [(branch.label, *branch.q.tolist(), "; ".join(map(str, branch.violations))) for branch in self.branches]
         return html_table(f"{self.arm.name}: {self.outcome} (rad, m)", columns, rows)
+
+
+def _shown(value: float, decimals: int) -> str:
+    """Write a number with some decimals, or with more where these would be zeros."""
+    text = f"{value:.{decimals}f}"
+    return text if float(text) else f"{value:.1g}"
 
 
 class NoSolutionError(ArmwrightError, ValueError):
