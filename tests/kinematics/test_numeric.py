@@ -122,6 +122,21 @@ def test_seven_joints(rng: np.random.Generator, sample: Sample) -> None:
         assert solution.best.label.startswith("shoulder ")
 
 
+def test_examples_of_many_joints_are_apart(rng: np.random.Generator) -> None:
+    """Of the endless configurations of eight joints no two that are given are nearly the same."""
+    joints = [Joint(kind="revolute", d=0.1, a=0.2, alpha=alpha, limits=TURN) for alpha in rng.uniform(0.5, 2.5, size=8)]
+    arm = Arm(name="eight", joints=joints)
+    q = random_configurations(arm, rng, 1)[0]
+
+    solution = inverse(arm, forward(arm, q), q)
+
+    found = np.array([branch.q for branch in solution])
+    apart = np.abs(np.remainder(found[:, None] - found + np.pi, 2 * np.pi) - np.pi).max(axis=-1)
+    assert len(found) > 3
+    assert apart[~np.eye(len(found), dtype=bool)].min() >= 0.1
+    np.testing.assert_allclose(found[0], q, atol=1e-9)
+
+
 def test_the_same_question_has_the_same_answer() -> None:
     """There is no chance in it: asked twice, it gives the same bits."""
     X = forward(SEVEN, np.linspace(-1, 1, 7))

@@ -38,6 +38,8 @@ _LEAST_DAMPING = 1e-14
 _POSE = 6
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
 _SAME_CONFIGURATION = 1e-5
+# Of the endless configurations of more joints examples are given, so far apart [rad], or in parts of the size.
+_EXAMPLES_APART = 0.1
 # A joint motion is taken for free where the tool is not moved by it to first order (singular values below this part
 # of the largest), nor by so long a motion along it once the other joints have made up for its curvature [rad] or [m].
 _IDLE = 1e-6
@@ -91,7 +93,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     than six joints, which cannot turn the tool to every pose, as good as nothing: the tool comes to the position.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
-    With more joints they are endless, and those that were found are examples, nearest first.
+    With more joints they are endless, and those that were found are examples, nearest first, some joint at
+    least 0.1 rad apart, or a slide a tenth of the arm.
 
     Args:
         arm: any arm.
@@ -183,7 +186,7 @@ def _search(task: _Task, near: Array) -> tuple[Array, Array]:
         ends = _descend(task, _starts(task, near, number * _STARTS, _STARTS))
         fresh = _reaching(task, ends)
         known = [Candidate(q, "") for q in reached]
-        news = any(not any(_same(task.arm, q, other) for other in known) for q in fresh)
+        news = any(not any(_same(task, q, other) for other in known) for q in fresh)
         tried, reached = np.concatenate([tried, ends]), np.concatenate([reached, fresh])
         if len(reached) and (task.arm.n > 6 or not news):
             break
@@ -196,19 +199,23 @@ def _named(task: _Task, reached: Array, near: Array, name: Callable[[Array], str
     names: Counter[str] = Counter()
     nearest = (nearest_equivalent(task.arm, q, near) for q in reached)
     for q in sorted(nearest, key=lambda q: (bool(violations(task.arm, q)), joint_distance(task.arm, near, q))):
-        if any(_same(task.arm, q, other) for other in solutions):
+        if any(_same(task, q, other) for other in solutions):
             continue
         names[word := name(q)] += 1
         solutions.append(Candidate(q, f"{word} {names[word]}", _free_joints(task, q)))
     return solutions
 
 
-def _same(arm: Arm, q: Array, other: Candidate) -> bool:
-    """Whether a configuration is another one, or a member of the family that is free there."""
+def _same(task: _Task, q: Array, other: Candidate) -> bool:
+    """Whether a configuration is another one, or nearly so of a redundant arm, or a member of the family free there."""
+    arm = task.arm
     locked = [i for i in range(arm.n) if i + 1 not in other.free]
     apart = q - other.q
     apart = np.where(arm.revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
-    return bool((np.abs(apart[locked]) < _SAME_CONFIGURATION).all())
+    least: float | Array = _SAME_CONFIGURATION
+    if arm.n > _POSE:
+        least = np.where(arm.revolute, _EXAMPLES_APART, _EXAMPLES_APART * task.size)[locked]
+    return bool((np.abs(apart[locked]) < least).all())
 
 
 def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
