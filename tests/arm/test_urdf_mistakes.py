@@ -57,6 +57,14 @@ MISTAKES: dict[str, tuple[str, str]] = {
         "<robot><xacro:include/></robot>",
         "Namespace prefix xacro on include is not defined; expand xacro files to URDF first",
     ),
+    "xacro beside another prefix": (
+        "<robot><drake:acceleration/><xacro:include/></robot>",
+        "Namespace prefix xacro on include is not defined; expand xacro files to URDF first",
+    ),
+    "a prefix in what is no XML": (
+        "<robot><drake:acceleration/>\n<link></robot>",
+        "arm.urdf:2: not valid XML: Opening and ending tag mismatch",
+    ),
     "a property of xacro": (
         one(f'<origin xyz="0 0 ${{height}}"/>{LIMIT}'),
         "joint 'turn', origin, xyz: expected a number, got '${height}'; expand xacro files",
@@ -262,6 +270,13 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     ):
         load_arm(tmp_path / "arm.urdf")
     assert issubclass(MissingExtraError, ImportError)
+
+
+def test_prefixes_of_other_programs(read: Callable[..., Arm]) -> None:
+    """Elements and attributes with a prefix that the file does not define are those of another program: ignored."""
+    limit = LIMIT.replace("/>", ' drake:acceleration="5"/>')
+
+    assert read(one(f'{limit}<drake:rotor_inertia value="0.1"/>')).joints == read(one(LIMIT)).joints
 
 
 def test_a_xacro_file_is_no_arm_file(tmp_path: Path) -> None:

@@ -184,15 +184,25 @@ def read_elements(path: Path) -> Element:
     etree: Any = import_extra("lxml.etree", "reading URDF", "urdf")
     # Nothing is fetched, and entities stay as they are: a file from elsewhere cannot make this read other files.
     # What is deep or huge is refused by the parser itself.
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, huge_tree=False
-    )
+    safely: Any = {
+        "resolve_entities": False,
+        "no_network": True,
+        "load_dtd": False,
+        "remove_comments": True,
+        "huge_tree": False,
+    }
+    parser = etree.XMLParser(**safely)
     try:
         raw = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        message = str(error.msg).partition(", line ")[0]
-        hint = f"; {_expand_first(path)}" if "xacro" in message else ""
-        raise FileFormatError(path, error.lineno or None, "", f"not valid XML: {message}{hint}") from error
+        # A prefix without a namespace belongs to another program, such as Drake, and is let pass as by other readers.
+        prefix = etree.ErrorTypes.NS_ERR_UNDEFINED_NAMESPACE
+        errors = [each for each in parser.error_log if each.type != prefix or "xacro" in each.message]
+        if errors:
+            message = errors[0].message
+            hint = f"; {_expand_first(path)}" if "xacro" in message else ""
+            raise FileFormatError(path, errors[0].line or None, "", f"not valid XML: {message}{hint}") from error
+        raw = etree.fromstring(data, etree.XMLParser(recover=True, **safely))
     space, tag = _split(raw)
     if tag != "robot":
         raise FileFormatError(path, raw.sourceline, "", f"expected <robot>, as URDF files have, got <{tag}>")
