@@ -9,13 +9,20 @@ from urllib.parse import unquote
 import attrs
 
 from armwright.arm.urdf.elements import Element
-from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, MissingExtraError, shown
+from armwright.errors import (
+    ArmwrightError,
+    FileFormatError,
+    InvalidValueError,
+    MissingExtraError,
+    listed,
+    shown,
+)
 from armwright.files.inputs import file_below
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.shapes import Mesh
 
-# Of meshes that are not read, so many are named.
-_MAX_NOTES = 10
+# So many reasons why meshes are not read are given, for each so many meshes are named, by so many letters at the end.
+_MAX_NOTES, _MAX_NAMED, _MAX_LETTERS = 10, 10, 50
 
 
 def _folders(value: Mapping[str, Path | str]) -> dict[str, Path]:
@@ -37,10 +44,17 @@ class MeshFiles:
     _read: dict[tuple[Path, tuple[float, ...]], Mesh] = attrs.field(factory=dict, init=False)
 
     def notes(self) -> list[str]:
-        """Return sentences on the meshes that were not read."""
-        notes = [f"the mesh {shown(name)} is not read: {why}" for name, why in self._unread.items()]
-        more = len(notes) - _MAX_NOTES
-        return [*notes[:_MAX_NOTES], *([f"{more:,} more meshes are not read"] if more > 0 else [])]
+        """Return sentences on the meshes that were not read, one for each reason."""
+        by_reason: dict[str, list[str]] = {}
+        for name, why in self._unread.items():
+            by_reason.setdefault(why, []).append(_shown_end(name))
+        notes = [
+            f"the {'mesh' if len(names) == 1 else 'meshes'} {listed(names, _MAX_NAMED)} "
+            f"{'is' if len(names) == 1 else 'are'} not read: {why}"
+            for why, names in by_reason.items()
+        ]
+        more = sum(len(names) for names in list(by_reason.values())[_MAX_NOTES:])
+        return [*notes[:_MAX_NOTES], *([f"{more:,} more are not read for other reasons"] if more else [])]
 
     def mesh(self, element: Element) -> Mesh | None:
         """Return the mesh of an element <mesh>; None, and a note, where its file is not there or of no known format.
@@ -114,3 +128,8 @@ def _from(folder: Path, path: Path) -> str:
     """Return a whole path as one from a folder, or as it is where it leads elsewhere."""
     here = folder.resolve()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+
+
+def _shown_end(name: str) -> str:
+    """Return the name of a file for a message: of a long one the end, which tells it from others."""
+    return shown(name if len(name) <= _MAX_LETTERS else f"...{name[-_MAX_LETTERS:]}")
