@@ -187,7 +187,7 @@ BEYOND = {
     ),
     "branches": (
         one(geom=GEOM + "".join(f'<body name="{n}"><joint name="{n}"/>{GEOM}</body>' for n in "ab")),
-        "the tip link is ambiguous: it could be 'a', 'b'; specify one as tip: load_mjcf(path, tip='a')",
+        "it could be 'a', 'b', or a link before them; specify one as tip: load_mjcf(path, tip='arm')",
     ),
     "two arms": (
         "<mujoco><worldbody>"

@@ -9,7 +9,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
-from armwright.arm.urdf.reader import load_urdf
+from armwright.arm.urdf.reader import load_urdf, read_urdf
 from armwright.errors import FileFormatError, InvalidValueError, KindError, MissingExtraError, UnknownNameError
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
 
@@ -117,7 +117,7 @@ MISTAKES: dict[str, tuple[str, str]] = {
     ),
     "two ends": (
         robot(*FORK),
-        "the tip link is ambiguous: it could be 'a', 'b'; specify one as tip: load_urdf(path, tip='a')",
+        "it could be 'a', 'b', or a link before them; specify one as tip: load_urdf(path, tip='a')",
     ),
     "no limit": (
         one(""),
@@ -270,6 +270,37 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     ):
         load_arm(tmp_path / "arm.urdf")
     assert issubclass(MissingExtraError, ImportError)
+
+
+@pytest.mark.parametrize(("fingers", "tip"), [(2, "hand"), (1, "hand"), (0, "hand")])
+def test_the_tip_that_is_likely_meant_is_proposed(fingers: int, tip: str, read: Callable[..., Arm]) -> None:
+    """Of an arm of four joints with a camera on its second link: the hand that carries the fingers, not the camera."""
+    names = ["base", "a", "b", "c", "hand", "camera", *(f"finger{k}" for k in range(fingers))]
+    joints = [joint(f"j{k}", "revolute", names[k], names[k + 1], LIMIT) for k in range(4)]
+    joints.append(joint("mount", "fixed", "b", "camera"))
+    joints += [joint(f"grip{k}", "prismatic", "hand", f"finger{k}", LIMIT) for k in range(fingers)]
+    links = [link(name) for name in names]
+    if fingers == 1:
+        links.append(link("palm"))
+        joints.append(joint("palm_mount", "fixed", "hand", "palm"))
+
+    with pytest.raises(FileFormatError, match=rf"the tip link is ambiguous: .* --tip {tip} -o arm.toml"):
+        read(robot(*links, *joints))
+    assert read(robot(*links, *joints), tip=tip).n == 4
+
+
+def test_what_is_probably_in_another_unit_is_told(tmp_path: Path) -> None:
+    """Limits in degrees and lengths in millimetres are read as they stand, with a question; 450° in rad without."""
+    for unit, factor, asked in (("deg", 1.0, True), ("rad", math.pi / 180, False)):
+        path = tmp_path / f"{unit}.urdf"
+        limit = LIMIT.replace('"-1"', f'"{-450 * factor}"').replace('"2"', f'"{450 * factor}"')
+        length = 450 if asked else 0.45
+        path.write_text(one(f'<origin xyz="0 0 {length}"/>{limit}'))
+
+        notes = read_urdf(path).notes
+
+        assert ("the arm is 450 m long; are its lengths in millimetres?" in notes) == asked
+        assert ("joint 1 ('turn') goes to 450 rad, 71.6 revolutions; are its limits in degrees?" in notes) == asked
 
 
 def test_prefixes_of_other_programs(read: Callable[..., Arm]) -> None:

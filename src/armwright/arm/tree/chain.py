@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
+from itertools import takewhile
 
 import attrs
 import numpy as np
@@ -15,6 +16,9 @@ from armwright.errors import listed, one_of
 from armwright.files.limits import limit, limit_message
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.shapes import Solid
+
+# A finger of a gripper has so many joints at most.
+_FINGER_JOINTS = 2
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -123,22 +127,41 @@ def _default_tip(tree: Tree, base: str) -> tuple[str, tuple[str, ...]]:
         raise tree.error(f"no joint moves a link below '{base}'")
     if len(ends) == 1:
         return ends[0], ()
-    carrier = _carrier(tree, base, ends)
+    paths = [_joint_path(tree, base, end) for end in ends]
+    carrier = _carrier(paths)
     if carrier is None:
+        likely = _likely_tip(paths)
         raise tree.error(
-            f"the tip link is ambiguous: it could be {quoted(ends)}; specify one as tip: "
-            f"{tree.function}(path, tip='{ends[0]}'), or armwright convert {tree.path} --tip {ends[0]} -o arm.toml"
+            f"the tip link is ambiguous: it could be {quoted(ends)}, or a link before them; specify one as tip: "
+            f"{tree.function}(path, tip='{likely}'), or armwright convert {tree.path} --tip {likely} -o arm.toml"
         )
     note = f"the tool is '{carrier}', which carries {quoted(ends)}; each moves as it does and may be the tip (--tip)"
     return carrier, (note,)
 
 
-def _carrier(tree: Tree, base: str, ends: list[str]) -> str | None:
-    """Return the last link that all ends hang on, if no joint moves between it and them, else None."""
-    paths = [_joint_path(tree, base, end) for end in ends]
-    common = [row[0] for row in zip(*paths, strict=False) if all(joint is row[0] for joint in row)]
+def _carrier(paths: Sequence[Sequence[TreeJoint]]) -> str | None:
+    """Return the last link that all ends of paths hang on, if no joint moves between it and them, else None."""
+    common = _common(paths)
     rigid = all(joint.fixed for path in paths for joint in path[len(common) :])
     return common[-1].child if common and rigid else None
+
+
+def _likely_tip(paths: Sequence[Sequence[TreeJoint]]) -> str:
+    """Return the link that is most likely meant: where a longest path ends, or where the fingers of its gripper begin.
+
+    Fingers are branches of one or two moving joints.
+    """
+    moving = [[joint for joint in path if not joint.fixed] for path in paths]
+    longest = max(range(len(paths)), key=lambda i: len(moving[i]))
+    most, first = len(moving[longest]), moving[longest][0]
+    common = _common([p for p, its in zip(paths, moving, strict=True) if its[0] is first and len(its) >= most - 1])
+    fingers = most - sum(not joint.fixed for joint in common)
+    return common[-1].child if fingers <= _FINGER_JOINTS else paths[longest][-1].child
+
+
+def _common(paths: Sequence[Sequence[TreeJoint]]) -> list[TreeJoint]:
+    """Return the joints with which all paths begin."""
+    return [row[0] for row in takewhile(lambda row: all(joint is row[0] for joint in row), zip(*paths, strict=False))]
 
 
 def _joint_path(tree: Tree, base: str, tip: str) -> list[TreeJoint]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -20,6 +21,8 @@ from armwright.spatial.shapes import Solid
 
 # Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
 _MEANT_PARALLEL = 1e-4
+# A joint that turns farther, or an arm that is longer, is probably given in another unit [rad], [m].
+_TURNED_FAR, _LONG = 4 * math.pi, 200.0
 
 
 @attrs.frozen(kw_only=True)
@@ -82,7 +85,20 @@ def serial_arm(
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         says = "gravity points downwards in the root link of the file" if gravity_from == "root" else "gravity"
         notes.append(f"{says}: {vector_text(arm.gravity)} along the axes of '{chain.base}'")
-    return Reading(arm=arm, notes=tuple(notes))
+    return Reading(arm=arm, notes=(*notes, *_doubtful_units(arm, size)))
+
+
+def _doubtful_units(arm: Arm, size: float) -> list[str]:
+    """Say what is so large that it may be in degrees or millimetres."""
+    notes = [f"the arm is {size:g} m long; are its lengths in millimetres?"] if size > _LONG else []
+    for i, joint in enumerate(arm.joints):
+        farthest = max((abs(x) for x in (joint.limits.lower, joint.limits.upper) if math.isfinite(x)), default=0.0)
+        if joint.revolute and farthest > _TURNED_FAR:
+            turns = farthest / math.tau
+            notes.append(
+                f"{arm.joint_label(i)} goes to {farthest:g} rad, {turns:.1f} revolutions; are its limits in degrees?"
+            )
+    return notes
 
 
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
