@@ -69,6 +69,16 @@ def test_hostile_couplings(values: dict[str, Any], kind: type[ArmwrightError], m
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize("ratio", [1e-30, 1e-8, 1e8, 1e16, 1e90])
+def test_ratios_of_any_size_have_an_inverse(ratio: float) -> None:
+    """A small number in the inverse is no rounding where nothing large is beside it."""
+    coupling = Coupling(matrix=np.array(WRIST) * np.array([[1.0], [ratio], [ratio]]))
+    q = np.array([0.3, 0.2 * ratio, -0.4 * ratio])
+
+    np.testing.assert_allclose(coupling.drives(q), [0.3, 0.2, -0.2], rtol=1e-14)
+    assert (coupling.inverse[[0, 0, 1, 1, 2], [1, 2, 0, 2, 0]] == 0).all()
+
+
 def test_couplings_of_other_arms() -> None:
     """An arm takes a coupling of as many joints as it has, and nothing else."""
     joints = [Joint(kind="revolute")] * 2

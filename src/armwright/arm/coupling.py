@@ -22,7 +22,7 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 # A matrix whose rows and columns are of length 1 and that shrinks some direction more than this has no inverse.
 _SINGULAR = 1e-6
-# What an inverse leaves in place of whole numbers.
+# What an inverse leaves in place of whole numbers, and in place of zeros beside numbers of some size.
 _NOISE = 1e-14
 
 
@@ -92,7 +92,10 @@ class Coupling:
     def inverse(self) -> Array:
         """The inverse (n, n) of ``matrix``: the drives by the joints; whole numbers in it are exact."""
         T = np.linalg.inv(self.matrix)
-        return read_only(np.where(np.abs(T - np.round(T)) < _NOISE, np.round(T), T) + 0.0)
+        size = np.minimum(np.abs(T).max(axis=0), np.abs(T).max(axis=1, keepdims=True))
+        T = np.where(np.abs(T) < _NOISE * size, 0.0, T)
+        whole = np.round(T)
+        return read_only(np.where((whole != 0) & (np.abs(T - whole) < _NOISE), whole, T))
 
     @cached_property
     def drive_limits(self) -> JointLimits:
