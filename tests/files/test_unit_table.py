@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -208,6 +209,8 @@ def test_missing_columns(write: Write) -> None:
     assert refused(lambda: header.require(["y", "x"])) == "table.csv:1: x_mm: no such column; there are pose, y_cm"
     said = refused(lambda: header.require(["t"], "paths take time"))
     assert said == "table.csv:1: t: no such column; paths take time; there are pose, y_cm"
+    other = read_header(write("a,b\nP,1\n"), attrs.evolve(SCHEMA, ignores_unknown=True))
+    assert refused(lambda: other.require(["t"])) == "table.csv:1: t: no such column; there are no known columns"
 
 
 # ---- column maps ---------------------------------------------------------------------------------------------------

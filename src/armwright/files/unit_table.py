@@ -132,7 +132,7 @@ class Header:
     @property
     def listing(self) -> str:
         """The columns, for a message."""
-        return ", ".join(heading.text for heading in self.headings.values()) or "no known column"
+        return ", ".join(heading.text for heading in self.headings.values()) or "no known columns"
 
     def error(self, name: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a column."""
