@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from armwright.arm.description import tables
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arm.urdf.reader import load_urdf, read_urdf
@@ -118,6 +119,10 @@ MISTAKES: dict[str, tuple[str, str]] = {
     "two ends": (
         robot(*FORK),
         "it could be 'a', 'b', or a link before them; specify one as tip: load_urdf(path, tip='a')",
+    ),
+    "no room between limits": (
+        one('<limit lower="0.5" upper="0.5" effort="1" velocity="1"/>'),
+        "a joint without limits has the type continuous, one that does not move the type fixed",
     ),
     "no limit": (
         one(""),
@@ -301,6 +306,18 @@ def test_what_is_probably_in_another_unit_is_told(tmp_path: Path) -> None:
 
         assert ("the arm is 450 m long; are its lengths in millimetres?" in notes) == asked
         assert ("joint 1 ('turn') goes to 450 rad, 71.6 revolutions; are its limits in degrees?" in notes) == asked
+
+
+def test_many_unknown_bodies(read: Callable[..., Arm]) -> None:
+    """The tables of an arm name two links whose mass is unknown with the reason, and say how many more there are."""
+    wrong = MASS.replace('ixx="1"', 'ixx="-1"')
+    links = [link(f"l{k}", wrong) for k in range(5)]
+    joints = [joint(f"j{k}", "revolute", f"l{k}", f"l{k + 1}", LIMIT) for k in range(4)]
+
+    (said,) = (each.title for each in tables(read(robot(*links, *joints))) if "unknown" in each.title)
+
+    assert said.count("a body cannot have the principal moments") == 2
+    assert said.endswith("; and 2 more links")
 
 
 def test_prefixes_of_other_programs(read: Callable[..., Arm]) -> None:

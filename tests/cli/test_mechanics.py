@@ -95,6 +95,14 @@ def test_inverse_of_seven_joints(tmp_path: Path) -> None:
     assert {branch["label"] for branch in data["branches"] if branch["allowed"]} == inside
 
 
+def test_inverse_of_seven_joints_without_a_closed_form() -> None:
+    """The solutions are examples, as the last line says."""
+    lines = armwright("inverse", "gen3", "--xyz", "300,100,400", "--rpy", "180,0,20").stdout.splitlines()
+
+    assert lines[0] == "solved"
+    assert lines[-1] == "examples: an arm of 7 joints has endless configurations for a pose"
+
+
 @pytest.mark.parametrize(
     ("arm", "swivel", "status", "said"),
     [

@@ -14,6 +14,7 @@ from armwright.arm.gravity import vector_text
 from armwright.arm.limits import Limits
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
+from armwright.errors import counted
 from armwright.files.result_table import ResultTable
 from armwright.spatial.euler import to_rpy
 from armwright.spatial.poses import to_noap
@@ -25,6 +26,8 @@ _GRAVITY_FROM = {
     "root": "downwards in the root link of the file; in a cell, the gravity of the cell applies",
     "world": "the gravity of the cell",
 }
+# Of links whose mass and inertia are unknown, so many are named with the reason.
+_MAX_UNKNOWN = 2
 # Parameters of a drive that affect the motion of the joint.
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward", "offset", "stribeck", "cube_root")
 
@@ -38,7 +41,8 @@ def tables(model: Arm) -> Iterator[ResultTable]:
         yield _fixed_joint_table(model)
     yield _limit_table(model, "Limits", [joint.limits for joint in model.joints])
     if unknown := [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]:
-        title = f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}"
+        more = f"; and {counted(len(unknown) - _MAX_UNKNOWN, 'more link')}" if len(unknown) > _MAX_UNKNOWN else ""
+        title = f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown[:_MAX_UNKNOWN])}{more}"
         yield ResultTable(title=title, heads=(), rows=())
     if any(link.mass or link.inertia.any() for link in model.links):
         yield _mass_table(model)

@@ -146,6 +146,8 @@ def _print(model: "Arm", solution: "InverseSolution") -> None:
             name, unit = swivel_unit(model)
             remarks.insert(0, f"swivel {branch.swivel / unit:z.3f} {name}")
         print(f"{values}   {branch.label}" + "".join(f"\n    {remark}" for remark in remarks))
+    if model.n > 6 and len(solution.branches) > 1 and solution.branches[0].swivel is None:
+        print(f"examples: an arm of {model.n} joints has endless configurations for a pose")
     if intervals := _intervals(model, solution):
         name, unit = swivel_unit(model)
         print(f"swivels within the limits, in {name}:")

@@ -377,10 +377,11 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
         return Limits(**largest), notes
     lower, upper = element.number("lower", 0.0), element.number("upper", 0.0)
     if not lower < upper:
+        still = ", one that does not move the type fixed" if lower == upper else ""
         raise element.error(
             "",
             f"the lower limit must be below the upper, got {lower:g} and {upper:g}, where an omitted one is 0; a "
-            "joint without limits has the type continuous",
+            f"joint without limits has the type continuous{still}",
         )
     lower, upper = (value if abs(value) < NO_LIMIT else math.copysign(math.inf, value) for value in (lower, upper))
     most = limit("revolutions") * math.tau
