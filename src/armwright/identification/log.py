@@ -16,6 +16,8 @@ _GAP = 5.0
 _EVEN = 0.01
 # Fewer samples than this are no motion.
 LEAST_SAMPLES = 50
+# A joint that moves by less does not move [rad], [m].
+LEAST_MOTION = 1e-3
 # Positions move if they change faster than this part of nearly the fastest.
 _MOVES = 0.05
 # So many equal readings in a row at the largest magnitude of a joint are clipped.
