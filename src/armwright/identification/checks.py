@@ -75,7 +75,8 @@ def _refuse_other_velocities(arm: Arm, log: Log, rate: Array) -> None:
 
 
 def log_warnings(arm: Arm, logs: Sequence[Log]) -> Iterator[str]:
-    """Give warnings of gaps, clipped efforts and joints that do not move."""
+    """Give warnings of repeated times, gaps, clipped efforts and joints that do not move."""
+    yield from dict.fromkeys(note for log in logs for note in log.notes)
     for log in logs:
         gaps = log.gaps()
         if gaps:

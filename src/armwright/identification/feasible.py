@@ -42,6 +42,8 @@ _THIN = 0.01
 _ROUNDING = 1e-14
 # The effect of a parameter that is smaller than this part of the largest is none.
 _SHOWS = 1e-10
+# A parameter that is smaller than this part of the drawing is rounding.
+_NOTHING = 1e-12
 # Terms of drives that cannot be negative.
 _DISSIPATING = ("rotor", "viscous", "coulomb", "forward", "backward", "cube_root", "stribeck", "stiffness")
 
@@ -149,7 +151,8 @@ def possible_bodies(
     # Of drives whose terms show nowhere nothing is known, and no solver can know.
     lengths = np.linalg.norm(columns, axis=0)
     shows = (lengths > _SHOWS * lengths.max()) | (np.arange(len(scales)) < OF_LINK * len(drawing))
-    values = np.where(shows, refinement.of(np.where(shows, solution.x[: len(scales)], 0.0)), 0.0) * scales
+    x = refinement.of(np.where(shows, solution.x[: len(scales)], 0.0))
+    values = np.where(shows & (np.abs(x) > _NOTHING), x, 0.0) * scales
     links = values[: OF_LINK * len(drawing)].reshape(-1, OF_LINK)
     return values, min(float(eigvalsh(_unfolded(own), P0)[0]) for own, P0 in zip(links, drawing, strict=True))
 
