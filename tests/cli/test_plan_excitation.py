@@ -47,3 +47,23 @@ def test_cells_of_other_arms_are_refused() -> None:
     done = armwright("plan-excitation", "stanford", "--cell", cell, "--arm", "ARM_2")
     assert done.returncode == ExitStatus.USAGE
     assert "no arm of the cell 'ARM_2'" in done.stderr
+
+
+def test_exports_for_controllers_that_keep_to_times(tmp_path: Path) -> None:
+    """The motion comes with its proof for one, is refused for another, and what a third lacks is said."""
+    done = armwright(
+        "plan-excitation", "ur5", "--period", 4, "--harmonics", 3, "--export", "ros2", "-o", tmp_path / "a"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "joints between the points" in done.stdout
+    names = {path.name for path in (tmp_path / "a").iterdir()}
+    assert names == {"ARM_1.trajectory.yaml", "ARM_1.goal.yaml", "events.json", "proof.json", "run.json"}
+
+    refused = armwright("plan-excitation", "ur5", "--export", "krl", "-o", tmp_path / "b")
+    assert refused.returncode == ExitStatus.USAGE
+    assert "expected ros2, csv, urscript, got krl" in refused.stderr
+    assert not (tmp_path / "b").exists()
+
+    unknown = armwright("plan-excitation", "ur5", "--period", 4, "--harmonics", 3, "--export", "csv")
+    assert unknown.returncode == ExitStatus.USAGE
+    assert "write `[arms.ARM_1.encoders]`" in unknown.stderr

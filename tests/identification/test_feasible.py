@@ -5,6 +5,7 @@ import sys
 import attrs
 import numpy as np
 import pytest
+from scipy.linalg import eigvalsh, null_space
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
@@ -35,19 +36,67 @@ def _limited(joint: Joint) -> Joint:
     return attrs.evolve(joint, limits=limits)
 
 
-def test_exact_measurements_of_an_exact_drawing_leave_it_as_it_is(rng: np.random.Generator) -> None:
+def test_exact_measurements_of_an_exact_drawing_leave_it_as_it_is(sample: Sample) -> None:
     """Where efforts are those of the drawing, the bodies are those of the drawing, also what no motion tells."""
-    arm = random_arm(rng, 4)
-    model = DynamicModel(arm=arm)
-    sums = summed([_equations(arm, model, rng)])
+    worst = 0.0
+    for rng in sample.cases(60):
+        arm = random_arm(rng, 4)
+        model = DynamicModel(arm=arm)
+        sums = summed([_equations(arm, model, rng)])
 
-    found = arm_of(model, feasible(model, sums, np.ones(4)).values)
+        found = arm_of(model, feasible(model, sums, np.ones(4)).values)
 
-    for link, expected in zip(found.links, arm.links, strict=True):
-        assert link.mass == pytest.approx(expected.mass, rel=1e-2)
-        np.testing.assert_allclose(link.com, expected.com, atol=1e-2)
-        np.testing.assert_allclose(link.inertia, expected.inertia, atol=1e-2)
-    assert found.motor_values("inertia") == pytest.approx(arm.motor_values("inertia"), abs=1e-2)
+        for link, expected in zip(found.links, arm.links, strict=True):
+            assert link.mass == pytest.approx(expected.mass, rel=1e-5)
+            np.testing.assert_allclose(link.com, expected.com, atol=1e-5)
+            np.testing.assert_allclose(link.inertia, expected.inertia, atol=1e-5)
+            worst = max(worst, abs(link.mass / expected.mass - 1))
+        assert found.motor_values("inertia") == pytest.approx(arm.motor_values("inertia"), abs=1e-5)
+    sample.record("exact efforts of exact drawings leave the bodies as they are", sample.count(60), 0, worst_mass=worst)
+
+
+def test_what_no_motion_tells_is_as_near_to_the_drawing_as_can_be(sample: Sample) -> None:
+    """No change of the links that leaves all base parameters as they are brings them nearer to the drawing."""
+    nearer = 0.0
+    for rng in sample.cases(40):
+        arm = random_arm(rng, int(rng.integers(1, 6)))
+        drawn = attrs.evolve(arm, links=[Link(mass=rng.uniform(0.5, 5), inertia=0.02 * np.eye(3)) for _ in arm.links])
+        model = DynamicModel(arm=drawn)
+        sums = summed([_equations(arm, model, rng, sigma=10.0 ** rng.uniform(-3, -0.5))])
+
+        found = feasible(model, sums, weighted(sums).sigma, weight=10.0 ** rng.uniform(-1, 3)).values
+
+        hidden = null_space(model.base.combinations[:, : 10 * arm.n])
+        for _ in range(10):
+            change = hidden @ rng.normal(size=hidden.shape[1])
+            change /= _size(found, change)
+            slope = _distance(drawn, found, change, 1e-3) - _distance(drawn, found, change, -1e-3)
+            bend = (
+                _distance(drawn, found, change, 1e-3)
+                + _distance(drawn, found, change, -1e-3)
+                - 2 * _distance(drawn, found, change, 0.0)
+            )
+            # By how much a parabola through the three is lower at its lowest point.
+            nearer = max(nearer, slope**2 / bend / 8)
+    sample.record("links nearer to the drawing with the same base parameters", sample.count(40), 0, nearer=nearer)
+    assert nearer < 1e-6
+
+
+def _size(values: Array, change: Array) -> float:
+    """The largest eigenvalue of a change of the pseudo-inertias, by what they are."""
+    pairs = zip(change.reshape(-1, 10), values[: len(change)].reshape(-1, 10), strict=True)
+    return max(float(np.abs(eigvalsh(_pseudo_of(own), _pseudo_of(of))).max()) for own, of in pairs)
+
+
+def _distance(drawn: Arm, values: Array, change: Array, part: float) -> float:
+    """The entropic distance of links from the drawing, to which a part of a change is added."""
+    total = 0.0
+    for i, own in enumerate(drawn.links):
+        rows = slice(10 * i, 10 * (i + 1))
+        P0 = _pseudo(own)
+        P, dP = (_pseudo_of(x[rows]) for x in (values, change))
+        total += np.trace(np.linalg.solve(P0, P + part * dP)) - np.linalg.slogdet(P + part * dP)[1]
+    return float(total)
 
 
 def test_bodies_are_possible_whatever_is_measured(sample: Sample) -> None:
@@ -92,6 +141,13 @@ def test_heavier_drawings_pull_more(rng: np.random.Generator) -> None:
 
     assert distance(arm_of(model, heavy.values)) < distance(arm_of(model, light.values))
     assert (sums.squares(heavy.base) / sigma**2).sum() > (sums.squares(light.base) / sigma**2).sum()
+
+
+def _pseudo_of(theta: Array) -> Array:
+    """The pseudo-inertia of ten parameters: half the trace of the tensor less the tensor, first moments, mass."""
+    m, h = theta[0], theta[1:4]
+    tensor = theta[[4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(3, 3)
+    return np.block([[np.trace(tensor) / 2 * np.eye(3) - tensor, h[:, None]], [h[None], np.array([[m]])]])
 
 
 def _pseudo(link: Link) -> Array:

@@ -1,5 +1,7 @@
 """Identification from logs to arm: choices by held-out blocks, bad logs in a clear word, and what would tell more."""
 
+import json
+
 import attrs
 import numpy as np
 import pytest
@@ -11,8 +13,9 @@ from armwright.dynamics.regressors import dynamic_parameters
 from armwright.errors import ContradictionError, FileFormatError, InvalidValueError, TooFewError
 from armwright.identification import Identification, hold_out, identify
 from armwright.identification.friction import LAWS
+from armwright.identification.identifiability import UNKNOWN
 from armwright.identification.log import Log
-from identification.simulated import log, truth
+from identification.simulated import fourier, log, noise, truth
 
 pytest.importorskip("clarabel", reason="the extra identification is not installed")
 
@@ -196,6 +199,39 @@ def test_too_little_motion_is_said(truth_arm: Arm, good: Log) -> None:
     assert any("joint 3 does not move in any log" in warning for warning in found.warnings)
     with pytest.raises(TooFewError):
         identify(truth_arm, [_changed(good, q=np.zeros_like(good.q))])
+
+
+@pytest.mark.parametrize("stands", [[2], [4, 5], [0], [1, 2, 3, 4, 5]], ids=str)
+def test_joints_that_never_move_leave_their_parameters_unknown(rng: np.random.Generator, stands: list[int]) -> None:
+    """What no joint tells is said to be unknown, with the motion that would tell it; no other number suffers."""
+    plain, t = truth(), np.arange(0, 20, 1 / 250)
+    motion = fourier(rng, plain.n, t)
+    for state, value in zip(motion, (0.3, 0.0, 0.0), strict=True):
+        state[:, stands] = value
+    tau = compile_arm(plain).inverse_dynamics(*motion)
+    reading = Log(name="log.csv", t=t, q=motion[0], effort=tau + 0.05 * noise(rng, tau.shape, 0.9))
+
+    found = identify(plain, [reading], laws=LAWS[1:2])
+
+    unknown = {each.name: each for each in found.weak if each.error >= UNKNOWN}
+    for joint in stands:
+        for term in ("viscous", "coulomb", "offset"):
+            name = f"{term}{joint + 1}"
+            assert name in unknown
+            assert unknown[name].motion.startswith("swing joint")
+            assert unknown[name].error_after < 0.3
+    assert np.isfinite(found.fit.errors).all()
+    json.dumps(found.as_data(), allow_nan=False)
+    moving = [joint for joint in range(plain.n) if joint not in stands]
+    names = found.model.base.names
+    for joint in moving:
+        k = names.index(f"viscous{joint + 1}")
+        assert abs(found.fit.values[k] - plain.motors[joint].viscous) < 4 * found.fit.errors[k]
+    assert found.arm is not None
+
+
+def test_no_log_is_refused(truth_arm: Arm) -> None:
+    """Without a log there is nothing to identify."""
     with pytest.raises(TooFewError, match="at least one log"):
         identify(truth_arm, [])
 

@@ -80,3 +80,15 @@ def test_times_must_increase(tmp_path: Path) -> None:
     path = _csv(tmp_path, "t,q1,q2,q3,tau1,tau2,tau3", np.column_stack([t, Q, Q]))
     with pytest.raises(FileFormatError, match=r"log.csv:32: t: expected times that increase, got 0.1 s after 0.29 s"):
         read_logs([path], ARM)
+
+
+def test_repeated_times_are_left_out_and_told(tmp_path: Path) -> None:
+    """Of two readings of one time the first is kept."""
+    rows = np.repeat(np.column_stack([T, Q, Q]), np.where(np.arange(60) % 20 == 3, 2, 1), axis=0)
+    rows[4, 1:] += 1
+    path = _csv(tmp_path, "t,q1,q2,q3,tau1,tau2,tau3", rows)
+
+    (log,) = read_logs([path], ARM)
+
+    np.testing.assert_allclose(log.q, Q, atol=1e-8)
+    assert log.notes == ("log.csv: 3 readings repeat the time of the one before, and are left out",)

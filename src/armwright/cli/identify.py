@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 def identify(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     logs: Annotated[
-        list[Path], Argument(help="CSV logs of positions and efforts or currents (docs/identification.md).")
+        list[Path],
+        Argument(help="Logs of positions and efforts or currents: CSV, MCAP, .db3 or bags (docs/identification.md)."),
     ],
     check: Annotated[
         list[Path] | None, Option("--check", help="Log that is held out, to validate with; may be repeated.")
@@ -49,6 +50,7 @@ def identify(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None, Option("--cutoff-hz", min=0.01, help="Cut-off of the filter; chosen when left out.")
     ] = None,
     folds: Annotated[int, Option(min=2, max=50, help="Folds by which filter, friction and prior are chosen.")] = 5,
+    topic: Annotated[str | None, Option(help="Topic of the joint states in MCAP files and bags.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     output: OutputFolder = None,
@@ -66,6 +68,7 @@ def identify(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.arrays import one_core
+    from armwright.export.conventions import find_convention
     from armwright.identification.identify import hold_out as held_out, identify as identified
     from armwright.identification.payload import identify_payload
     from armwright.identification.reading import read_logs
@@ -73,7 +76,15 @@ def identify(  # noqa: PLR0917 - Typer reads one parameter per option
 
     model = load_arm(arm)
     scale = _gains(model, gains)
-    read = partial(read_logs, arm=model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
+    convention = find_convention(model, None)
+    read = partial(
+        read_logs,
+        arm=model,
+        columns=columns_of(columns),
+        skip_incomplete=skip_incomplete,
+        topic=topic,
+        joint_names=convention.ros_joints if convention is not None and len(convention.ros_joints) == model.n else (),
+    )
     for path in (*logs, *(check or ()), *(loaded or ())):
         warn_of_stray(path)
     if loaded:

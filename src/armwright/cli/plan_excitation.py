@@ -7,8 +7,12 @@ from typer import Option
 
 from armwright.cli.options import ArmName, Json, usage_error
 from armwright.cli.output import print_result
+from armwright.cli.results import write_results
+from armwright.export.targets import Target
 
 if TYPE_CHECKING:
+    from armwright.cell.model import CellArm
+    from armwright.export import ExportedProgram
     from armwright.identification.excitation import Excitation, FreeCheck
     from armwright.identification.model import DynamicModel
 
@@ -35,12 +39,21 @@ def plan_excitation(  # noqa: PLR0917 - Typer reads one parameter per option
     starts: Annotated[int, Option(min=1, max=100, help="Random motions to begin with; the best one is kept.")] = 1,
     seed: Annotated[int, Option(min=0, help="Seed of these.")] = 0,
     rate_hz: Annotated[float, Option("--rate-hz", min=1.0, max=10_000.0, help="Rows of the CSV per second.")] = 100.0,
+    target: Annotated[
+        Target | None,
+        Option(
+            "--export",
+            help="Controller that the motion is written for, exact in time, into the folder -o: ros2, csv (counts of "
+            "drives; --cell has the encoders) or urscript.",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         Option(
             "-o",
             "--output",
-            help="CSV of the motion (time, positions, velocities, accelerations), or .rlo for a program.",
+            help="CSV of the motion (time, positions, velocities, accelerations), or .rlo for a program through its "
+            "poses; with --export a folder.",
         ),
     ] = None,
     as_json: Json = False,
@@ -48,18 +61,21 @@ def plan_excitation(  # noqa: PLR0917 - Typer reads one parameter per option
     """Plan a motion from which masses, inertias and friction of an arm can be identified.
 
     Every joint moves by a few harmonics of one period, from rest to rest, within the limits of position, speed,
-    acceleration and effort. The command prints the condition and the standard errors to expect. Play the motion, log
-    positions and currents, and run `identify`.
+    acceleration and effort. The command prints the condition and the standard errors to expect. Play the motion, by
+    its table or by --export, log positions and currents, and run `identify`.
 
     **Example:** `armwright plan-excitation ur5 -o out/excitation.csv`
     """
     import numpy as np
 
     from armwright.arm.load import load_arm
+    from armwright.export.joint_motion import require_times
     from armwright.files.output import write_file
     from armwright.identification.excitation import MotionLimits, plan_excitation as planned
     from armwright.identification.model import DynamicModel
 
+    if target is not None:
+        require_times(target)
     model = DynamicModel(arm=load_arm(arm), terms=("rotor", "viscous", "coulomb"))
     finite = np.isfinite(model.arm.limits.effort)
     largest = np.where(finite, model.arm.limits.effort, 100.0)
@@ -74,11 +90,49 @@ def plan_excitation(  # noqa: PLR0917 - Typer reads one parameter per option
         starts=starts,
         seed=seed,
     )
-    if output is not None:
+    exported = None
+    if target is not None:
+        exported = _exported(plan, target, cell, in_cell)
+        if output is not None:
+            write_results(output, exported.files)
+    elif output is not None:
         write_file(output, _program(plan) if output.suffix == ".rlo" else _csv(plan, rate_hz))
     print_result(plan, as_json=as_json)
-    if output is not None and not as_json:
+    if as_json:
+        return
+    if exported is not None:
+        print(f"{target}: {plan.motion.period:.6g} s of motion, proved:")
+        for line in exported.proof.lines():
+            print(f"  {line}")
+    if output is not None:
         print(f"motion: {output}")
+
+
+def _exported(plan: "Excitation", target: Target, path: Path | None, name: str | None) -> "ExportedProgram":
+    """Return the motion for a controller, of which a cell says more."""
+    from armwright.cell.model import CellArm
+    from armwright.errors import InvalidValueError
+    from armwright.export import ExportError, export_motion
+
+    motion = plan.trajectory
+    placed = CellArm(arm=plan.model.arm, start=motion(0.0)) if path is None else _placed(path, name, plan.model)
+    try:
+        return export_motion(target, motion, placed, "excitation")
+    except ExportError as error:
+        # There is no line of a program to show, but what helps.
+        raise InvalidValueError("; ".join([error.diagnostic.message, *error.diagnostic.helps])) from error
+
+
+def _placed(path: Path, name: str | None, model: "DynamicModel") -> "CellArm":
+    """Return the arm of a cell that is meant: its first one, or the one of a name."""
+    from armwright.cell.reader import read_cell
+    from armwright.errors import one_of
+
+    cell = read_cell(path)
+    placed = cell.arms[next(iter(cell.arms)) if name is None else one_of("arm of the cell", name, cell.arms)]
+    if placed.arm.n != model.arm.n:
+        raise usage_error("--cell", f"expected an arm with the {model.arm.n} joints of {model.arm.name}")
+    return placed
 
 
 def _free_check(path: Path, name: str | None, model: "DynamicModel") -> "FreeCheck":

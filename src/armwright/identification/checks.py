@@ -14,12 +14,10 @@ from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import ContradictionError, FileFormatError, InvalidValueError, counted, listed
 from armwright.identification.equations import Equations
-from armwright.identification.log import Log
+from armwright.identification.log import LEAST_MOTION, Log
 from armwright.identification.model import DynamicModel
 from armwright.identification.signals import Motion
 
-# A joint that moves by less does not move [rad], [m].
-_LEAST_MOTION = 1e-3
 # Velocities that differ from the derivative of positions by more than this part are in other units.
 _OTHER_UNIT = 0.2
 # A joint that is so many times as fast as it can be is in another unit, or its times are.
@@ -64,7 +62,7 @@ def refuse_other_units(arm: Arm, logs: Sequence[Log]) -> None:
 def _refuse_other_velocities(arm: Arm, log: Log, rate: Array) -> None:
     for i in range(log.n):
         own = log.qd[:, i] if log.qd is not None else rate[:, i]
-        if np.ptp(log.q[:, i]) < _LEAST_MOTION or not own.any():
+        if np.ptp(log.q[:, i]) < LEAST_MOTION or not own.any():
             continue
         factor = float(own @ rate[:, i] / (rate[:, i] @ rate[:, i]))
         if abs(factor - 1) > _OTHER_UNIT:
@@ -77,7 +75,8 @@ def _refuse_other_velocities(arm: Arm, log: Log, rate: Array) -> None:
 
 
 def log_warnings(arm: Arm, logs: Sequence[Log]) -> Iterator[str]:
-    """Give warnings of gaps, clipped efforts and joints that do not move."""
+    """Give warnings of repeated times, gaps, clipped efforts and joints that do not move."""
+    yield from dict.fromkeys(note for log in logs for note in log.notes)
     for log in logs:
         gaps = log.gaps()
         if gaps:
@@ -90,7 +89,7 @@ def log_warnings(arm: Arm, logs: Sequence[Log]) -> Iterator[str]:
                 f"{arm.joints[i].units.effort}, {counted(count, 'reading')} together: clipped, and left out"
             )
     travel = np.max([np.ptp(log.q, axis=0) for log in logs], axis=0)
-    for i in np.flatnonzero(travel < _LEAST_MOTION):
+    for i in np.flatnonzero(travel < LEAST_MOTION):
         label = arm.joint_label(int(i))
         yield f"{label} does not move in any log: nothing is learnt of its drive, and little of its link"
 

@@ -27,6 +27,7 @@ from armwright.errors import ContradictionError
 from armwright.extras import import_extra
 from armwright.identification.fitting import Sums
 from armwright.identification.model import DynamicModel
+from armwright.identification.refinement import Refinement
 
 # Entries of the upper triangle of a symmetric matrix, column by column, as Clarabel has them.
 _UPPER4 = [(i, j) for j in range(4) for i in range(j + 1)]
@@ -37,6 +38,12 @@ _OWN = len(_UPPER4) + 4
 _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.1
 # No body is as thin as this part of its mean extent; no pseudo-inertia is smaller than that of such a body.
 _THIN = 0.01
+# Combinations of equations that are shorter than this part of the longest, squared, are rounding.
+_ROUNDING = 1e-14
+# The effect of a parameter that is smaller than this part of the largest is none.
+_SHOWS = 1e-10
+# A parameter that is smaller than this part of the drawing is rounding.
+_NOTHING = 1e-12
 # Terms of drives that cannot be negative.
 _DISSIPATING = ("rotor", "viscous", "coulomb", "forward", "backward", "cube_root", "stribeck", "stiffness")
 
@@ -134,9 +141,34 @@ def possible_bodies(
             f"no set of bodies explains the measurements: the semidefinite program ended with {solution.status}; are "
             "the units, the gains and the order of the joints right?"
         )
-    values = np.array(solution.x[: len(scales)]) * scales
+    # Scaled so that the drawing is the identity, as the program is.
+    roots = [np.linalg.inv(np.linalg.cholesky(P0)) for P0 in drawing]
+    units = np.array([_unfolded(unit) for unit in np.eye(OF_LINK)])
+    of_bodies = scales[: OF_LINK * len(drawing)].reshape(-1, OF_LINK, 1, 1)
+    columns, told = _whitened(measured, weight)
+    columns = columns * scales
+    refinement = Refinement(columns, told, of_bodies * np.array([L @ units @ L.T for L in roots]), bounded)
+    # Of drives whose terms show nowhere nothing is known, and no solver can know.
+    lengths = np.linalg.norm(columns, axis=0)
+    shows = (lengths > _SHOWS * lengths.max()) | (np.arange(len(scales)) < OF_LINK * len(drawing))
+    x = refinement.of(np.where(shows, solution.x[: len(scales)], 0.0))
+    values = np.where(shows & (np.abs(x) > _NOTHING), x, 0.0) * scales
     links = values[: OF_LINK * len(drawing)].reshape(-1, OF_LINK)
     return values, min(float(eigvalsh(_unfolded(own), P0)[0]) for own, P0 in zip(links, drawing, strict=True))
+
+
+def _whitened(measured: Measured, weight: float) -> tuple[Array, Array]:
+    """Return columns (r, p) and a right side (r,) of independent equations that say what measurements do.
+
+    Their errors have as standard deviation the root of 1 / weight.
+    """
+    b = len(measured.combinations)
+    N = np.einsum("n,nij->ij", 1 / measured.sigma**2, measured.sums.products) / weight
+    lengths = np.sqrt(np.maximum(N.diagonal()[:b], np.finfo(float).tiny))
+    sizes, vectors = np.linalg.eigh(N[:b, :b] / np.outer(lengths, lengths))
+    told = sizes > _ROUNDING * sizes[-1]
+    root, vectors = np.sqrt(sizes[told]), vectors[:, told]
+    return ((vectors * root).T * lengths) @ measured.combinations, (vectors / root).T @ (N[:b, b] / lengths)
 
 
 def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:

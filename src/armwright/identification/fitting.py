@@ -36,8 +36,13 @@ _ROUNDS = 4
 # Lags at which residuals are compared, and the largest order of their process.
 _LAGS = 60
 _LARGEST_ORDER = 12
-# A combination of columns that is shorter than this part of the longest is not excited at all.
-_SINGULAR = 1e-8
+# A combination of columns that is shorter than this part of the longest is not excited at all; its square is rounding.
+_SINGULAR = 1e-6
+# A single column that is shorter than this part of the longest is rounding.
+_SHORT = 1e-8
+# No residual is smaller than this part of the efforts of its joint, nor than that part of those of other joints.
+_EXACT, _LIKE_OTHERS = 1e-6, 1e-5
+_TINY = float(np.finfo(float).tiny)
 _MAX_OUTLIERS = 1000
 
 
@@ -89,11 +94,7 @@ def summed(blocks: Iterable[Equations], fit: Fit | None = None) -> Sums:
         if fit is not None:
             weights = np.sqrt(_weights(block.tau - block.columns @ fit.values, fit.sigma, block.usable))
         both = np.concatenate([block.columns, block.tau[:, :, None]], axis=2) * weights[:, :, None]
-        products = (
-            np.einsum("kni,knj->nij", both, both, optimize=True)
-            if False
-            else np.matmul(both.transpose(1, 2, 0), both.transpose(1, 0, 2))
-        )
+        products = np.matmul(both.transpose(1, 2, 0), both.transpose(1, 0, 2))
         new = Sums(products, block.usable.sum(axis=0).astype(np.float64))
         total = new if total is None else total + new
     if total is None:
@@ -157,8 +158,7 @@ class Fit:
     @property
     def errors(self) -> Array:
         """(b,) standard errors of the parameters."""
-        # Rounding puts variances of next to nothing below 0.
-        return np.sqrt(np.maximum(self.covariance.diagonal(), 0.0))
+        return np.sqrt(self.covariance.diagonal())
 
 
 def ordinary(sums: Sums) -> Fit:
@@ -191,30 +191,39 @@ def _of_sums(sums: Sums, sigma: Array) -> Fit:
         )
     weights = np.where(sums.counts > 0, 1 / sigma**2, 0.0)
     N = np.einsum("n,nij->ij", weights, sums.products)
-    inverse = _inverse(N[:b, :b])
+    inverse = inverse_of(N[:b, :b])
     values = inverse @ N[:b, b]
     squares = sums.squares(values)
-    # Parameters make residuals smaller, those of each joint by its share.
-    own = np.maximum(sums.counts * (1 - b / total), 1.0)
-    efforts = sums.products[:, b, b]
-    # A joint without effort is known to what can be told beside the others.
-    floor = 1e-12 * np.maximum(efforts, 1e-12 * efforts.max() or 1.0)
-    new = np.sqrt(np.maximum(squares, floor) / own)
+    new = _deviations(squares, sums.products[:, b, b], sums.counts, b)
     scale = float((weights * squares).sum() / (total - b))
     return Fit(values=values, covariance=scale * inverse, sigma=new, counts=sums.counts, normal=N[:b, :b])
 
 
-def _inverse(N: Array) -> Array:
-    """Return the inverse of normal equations."""
+def _deviations(squares: Array, efforts: Array, counts: Array, parameters: int) -> Array:
+    """Return the standard deviations of residuals (n,), by their squares and those of the efforts, added up."""
+    # Parameters make residuals smaller, those of each joint by its share.
+    own = np.maximum(counts * (1 - parameters / counts.sum()), 1.0)
+    # Efforts that are predicted to the last digit do not make all others worthless, nor do those of joints without any.
+    variances = np.maximum(squares, _EXACT**2 * efforts) / own
+    return np.asarray(np.sqrt(np.maximum(variances, max(_LIKE_OTHERS**2 * float(variances.max()), _TINY))))
+
+
+def inverse_of(N: Array) -> Array:
+    """Return the inverse (b, b) of normal equations; of what is not excited it is very large."""
+    half, _ = _inverse_root(N)
+    # A matrix times its transpose has no variance below 0.
+    return np.asarray(half @ half.T)
+
+
+def _inverse_root(N: Array) -> tuple[Array, Flags]:
+    """Return a root (b, b) of the inverse of normal equations, and which of its columns are of excited combinations."""
     squares = N.diagonal()
     # A column of zeros has no length of its own; it is as far below the others as numbers that are rounded.
-    lengths = np.sqrt(np.maximum(squares, max(1e-24 * squares.max(), np.finfo(float).tiny)))
+    lengths = np.sqrt(np.maximum(squares, max(_SHORT**2 * squares.max(), _TINY)))
     sizes, vectors = np.linalg.eigh(N / np.outer(lengths, lengths))
     # What is not excited keeps a variance, a very large one.
-    sizes = np.maximum(sizes, _SINGULAR**2 * sizes[-1])
-    # A matrix times its transpose has no variance below 0.
-    half = vectors / np.sqrt(sizes) / lengths[:, None]
-    return np.asarray(half @ half.T)
+    least = _SINGULAR**2 * sizes[-1]
+    return vectors / np.sqrt(np.maximum(sizes, least)) / lengths[:, None], sizes > least
 
 
 def robust(blocks: Iterable[Equations], start: Fit | None = None) -> Fit:
@@ -261,17 +270,17 @@ def _weights(residuals: Array, sigma: Array, usable: Flags) -> Array:
 def _reweighted(blocks: Iterable[Equations], values: Array, sigma: Array) -> tuple[Array, Array, Array]:
     """Return parameters and scales after one pass, and the inverse of the normal equations."""
     N, right = np.zeros((len(values), len(values))), np.zeros(len(values))
-    squares, counts = np.zeros_like(sigma), np.zeros_like(sigma)
+    squares, efforts, counts = np.zeros_like(sigma), np.zeros_like(sigma), np.zeros_like(sigma)
     for block in blocks:
         residuals = block.tau - block.columns @ values
         weights = _weights(residuals, sigma, block.usable)
         A = (block.columns * (np.sqrt(weights) / sigma)[:, :, None]).reshape(-1, len(values))
         N, right = N + A.T @ A, right + A.T @ (block.tau * np.sqrt(weights) / sigma).reshape(-1)
         squares += ((weights * residuals) ** 2 * block.usable).sum(axis=0)
+        efforts += (block.tau**2 * block.usable).sum(axis=0)
         counts += block.usable.sum(axis=0)
-    inverse = _inverse(N)
-    own = np.maximum(counts * (1 - len(values) / counts.sum()), 1.0)
-    return inverse @ right, np.sqrt(np.maximum(squares, np.finfo(float).tiny) / own / _CONSISTENT), inverse
+    inverse = inverse_of(N)
+    return inverse @ right, _deviations(squares / _CONSISTENT, efforts, counts, len(values)), inverse
 
 
 def _with_errors(blocks: Iterable[Equations], values: Array, sigma: Array, start: Fit) -> Fit:
@@ -302,15 +311,19 @@ def _with_errors(blocks: Iterable[Equations], values: Array, sigma: Array, start
                 )
     processes = [_process(products[:, j] / np.maximum(pairs[:, j], 1.0), counts[j]) for j in range(n)]
     scale = np.sqrt(np.diagonal(across) / np.maximum(counts, 1.0))
-    correlation = across / np.maximum(together, 1.0) / np.maximum(np.outer(scale, scale), np.finfo(float).tiny)
+    correlation = across / np.maximum(together, 1.0) / np.maximum(np.outer(scale, scale), _TINY)
     np.fill_diagonal(correlation, 1.0)
     meat = _meat(blocks, sigma, processes, correlation, b)
     # Huber's estimator loses the equations that are cut off; parameters have made residuals smaller.
     slopes = np.where(counts > 0, inliers / np.maximum(counts, 1.0), 1.0)
     kept = float((slopes * counts).sum() / counts.sum())
-    inverse = _inverse(N)
+    half, excited = _inverse_root(N)
+    # How much more the parameters vary than by independent residuals; of what is not excited no residual tells.
+    more = half.T @ meat @ half
+    more[~excited], more[:, ~excited] = 0.0, 0.0
+    more[~excited, ~excited] = 1.0
     total = float(counts.sum())
-    covariance = inverse @ meat @ inverse / kept**2 * total / max(total - b, 1.0)
+    covariance = half @ more @ half.T / kept**2 * total / max(total - b, 1.0)
     return attrs.evolve(
         start,
         values=values,
@@ -349,7 +362,7 @@ def _process(autocovariance: Array, count: float) -> _Process:
     Source:
         Levinson (1947), Durbin (1960); Schwarz (1978).
     """
-    variance = max(float(autocovariance[0]), np.finfo(float).tiny)
+    variance = max(float(autocovariance[0]), _TINY)
     best = _Process(np.zeros(0), variance, variance)
     coefficients, innovation, least = np.zeros(0), variance, 0.0
     for order in range(1, _LARGEST_ORDER + 1):

@@ -8,14 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.dynamics.regressors import OF_LINK
 from armwright.identification.feasible import body_sizes
-from armwright.identification.fitting import Fit
+from armwright.identification.fitting import Fit, inverse_of
 from armwright.identification.model import DynamicModel
 
 # A parameter whose standard error is a larger part of it is hardly known.
 LARGEST_ERROR = 0.3
+# One whose standard error is so many times as large as it is not known at all.
+UNKNOWN = 100.0
 # A motion that makes an error smaller by less than this part tells nothing.
 _WORTH = 0.1
 # Swings: their duration [s], samples per second, largest amplitude [rad] and [m], and part of the greatest speed.
@@ -50,19 +52,20 @@ def weak_parameters(model: DynamicModel, fit: Fit) -> list[WeakParameter]:
         model: of the arm.
         fit: of its base parameters.
     """
-    size = np.maximum(np.abs(fit.values), _sizes(model, fit))
-    relative = fit.errors / np.maximum(size, np.finfo(float).tiny)
+    size = _sizes(model, fit)
+    relative = np.minimum(fit.errors / size, UNKNOWN)
     weak = np.flatnonzero(relative > LARGEST_ERROR)
     if not len(weak):
         return []
-    # Information as it is with noise in time: by how much it is less than of independent equations.
-    dilution = float(np.median(fit.covariance.diagonal() / np.linalg.pinv(fit.normal, hermitian=True).diagonal()))
-    known = np.linalg.inv(fit.covariance)
+    # Noise hangs together in time in both motions, and makes both tell less by the same factor.
+    before = inverse_of(fit.normal).diagonal()
+    # Joints that never moved are taken for as noisy as the others.
+    sigma = np.where(fit.counts > 0, fit.sigma, np.median(fit.sigma[fit.counts > 0]))
     after: list[tuple[str, Array]] = []
     for text, motion in _swings(model.arm):
-        Y = model.base_columns(*motion) / fit.sigma[:, None]
-        added = np.einsum("knb,knc->bc", Y, Y, optimize=True) / max(dilution, 1.0)
-        after.append((text, np.sqrt(np.linalg.inv(known + added).diagonal())))
+        Y = model.base_columns(*motion) / sigma[:, None]
+        added = np.einsum("knb,knc->bc", Y, Y, optimize=True)
+        after.append((text, fit.errors * np.sqrt(inverse_of(fit.normal + added).diagonal() / before)))
     result = []
     for k in weak.tolist():
         text, errors = min(after, key=lambda each: each[1][k])
@@ -72,7 +75,7 @@ def weak_parameters(model: DynamicModel, fit: Fit) -> list[WeakParameter]:
                 name=model.base.names[k],
                 error=float(relative[k]),
                 motion=text if is_worth_it else "",
-                error_after=float(errors[k] / size[k]) if is_worth_it else float(relative[k]),
+                error_after=float(min(errors[k] / size[k], UNKNOWN)) if is_worth_it else float(relative[k]),
             )
         )
     return result
@@ -88,7 +91,22 @@ def _sizes(model: DynamicModel, fit: Fit) -> Array:
         if name.startswith(("offset", "cube_root", "stribeck")):
             joint = name.lstrip("abcdefghijklmnopqrstuvwxyz_")
             sizes[k] = abs(named.get(f"coulomb{joint}", named.get(f"forward{joint}", 0.0)))
-    return np.asarray(np.abs(model.base.combinations * sizes).max(axis=1))
+    drawn = np.abs(model.base.combinations * sizes).max(axis=1)
+    unknown = fit.errors > UNKNOWN * np.where(drawn > 0, drawn, np.abs(fit.values))
+    # A value of which nothing is known is no size.
+    found = np.where(unknown, _of_other_joints(model, fit, unknown), np.abs(fit.values))
+    return np.maximum(np.maximum(drawn, found), np.finfo(float).tiny)
+
+
+def _of_other_joints(model: DynamicModel, fit: Fit, unknown: Flags) -> Array:
+    """Return how large such parameters (b,) of other joints are, by those that are known; 1 where none is."""
+    kinds = np.array([name.rstrip("0123456789") for name in model.base.names])
+    sizes = np.ones(len(kinds))
+    for kind in set(kinds[unknown].tolist()):
+        known = (kinds == kind) & ~unknown
+        if known.any():
+            sizes[kinds == kind] = np.median(np.abs(fit.values[known]))
+    return sizes
 
 
 def _swings(arm: Arm) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, Flags, exact_shape, floats, read_only
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, counted
 
 # Samples farther apart than so many usual ones are a gap.
 _GAP = 5.0
@@ -16,6 +16,8 @@ _GAP = 5.0
 _EVEN = 0.01
 # Fewer samples than this are no motion.
 LEAST_SAMPLES = 50
+# A joint that moves by less does not move [rad], [m].
+LEAST_MOTION = 1e-3
 # Positions move if they change faster than this part of nearly the fastest.
 _MOVES = 0.05
 # So many equal readings in a row at the largest magnitude of a joint are clipped.
@@ -37,6 +39,7 @@ class Log:
         effort: (k, n) efforts at the joints [N m] or [N]; or currents [A], where drive gains are sought.
         qd: (k, n) measured joint velocities; None where they were not measured.
         clipped: (k, n) whether a reading of the effort is at the end of its range.
+        notes: what a reader must know of how it was read.
     """
 
     name: str
@@ -47,6 +50,26 @@ class Log:
     clipped: Flags = attrs.field(
         default=attrs.Factory(lambda self: _clipped(self.effort), takes_self=True), converter=read_only
     )
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of_readings(cls, name: str, t: Array, q: Array, effort: Array, qd: Array | None = None) -> Log:
+        """Return a log without the readings that repeat the time of the one before, and a note of them.
+
+        Raises:
+            InvalidValueError: there are too few others, or a time goes back.
+        """
+        kept = np.concatenate([[True], np.diff(t) != 0]) if len(t) else np.zeros(0, dtype=np.bool_)
+        count = int((~kept).sum())
+        note = f"{name}: {counted(count, 'reading')} repeat the time of the one before, and are left out"
+        return cls(
+            name=name,
+            t=t[kept],
+            q=q[kept],
+            effort=effort[kept],
+            qd=None if qd is None else qd[kept],
+            notes=(note,) if count else (),
+        )
 
     def __attrs_post_init__(self) -> None:
         """Refuse arrays that do not fit together, too few readings, and times that do not increase."""

@@ -1,7 +1,8 @@
-"""Logs from CSV whose column names have units: times, joint positions, and efforts or motor currents.
+"""Logs from files: CSV whose column names have units, with times, joint positions, and efforts or motor currents.
 
 ``time_s, joint_1_deg, ..., joint_1_effort_nm, ...`` or ``joint_1_current_a, ...``, with ``joint_1_velocity_deg_per_s``
-where velocities were measured. The names of ``motion.csv`` (t, q1, qd1, tau1) are known, in SI units.
+where velocities were measured. The names of ``motion.csv`` (t, q1, qd1, tau1) are known, in SI units. Recordings are
+read by ``recordings``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files import column_names as names
 from armwright.files.unit_table import Header, read_headers
 from armwright.identification.log import Log, with_gains
+from armwright.identification.recordings import is_recording, read_recording
 
 
 def read_logs(
@@ -26,22 +28,39 @@ def read_logs(
     gains: ArrayLike | None = None,
     columns: Mapping[str, str] | None = None,
     skip_incomplete: bool = False,
+    topic: str | None = None,
+    joint_names: Sequence[str] = (),
 ) -> list[Log]:
     """Read logs of one arm.
 
     Args:
-        paths: the files.
+        paths: CSV files, MCAP files, databases ``.db3`` of ROS 2, or folders of bags.
         arm: that moved, with n joints.
-        gains: (n,) effort at the joint per current [N m/A] or [N/A], for logs of currents.
-        columns: names of columns, with unit, by those in the files: ``{"i_1": "joint_1_current_a"}``.
+        gains: (n,) effort at the joint per current [N m/A] or [N/A], for logs of currents; with them the efforts of
+            recordings, which have no units, are currents.
+        columns: names of columns, with unit, by those in the files: ``{"i_1": "joint_1_current_a"}``; of recordings
+            names of joints: ``{"elbow": "joint_3"}``.
         skip_incomplete: leave out rows with empty cells.
+        topic: of the joint states in recordings; the only one with efforts that is no plan when left out.
+        joint_names: (n,) names of the joints in recordings, where the arm has none.
 
     Raises:
         FileFormatError: a file is missing or broken, a column is missing or has another unit, or a value is no number.
-        InvalidValueError: a log has currents, and there are no gains; its times do not increase.
+        InvalidValueError: a log has currents, and there are no gains; its times go back; several topics may be meant.
+        UnknownNameError: a recording has no such topic.
+        MissingExtraError: what reads a recording is not installed.
     """
-    headers = read_headers(paths, _schema(arm), columns=columns)
-    return [_read(header, arm, gains, skip_incomplete=skip_incomplete) for header in headers]
+    recorded = [is_recording(Path(path)) for path in paths]
+    tables = [path for path, is_recorded in zip(paths, recorded, strict=True) if not is_recorded]
+    if topic is not None and len(tables) == len(paths):
+        raise InvalidValueError(f"topic: expected an MCAP file or a bag, got {Path(paths[0]).name}")
+    headers = iter(read_headers(tables, _schema(arm), columns=columns) if tables else [])
+    return [
+        read_recording(Path(path), arm, gains=gains, topic=topic, renamed=columns, joint_names=joint_names)
+        if is_recorded
+        else _read(next(headers), arm, gains, skip_incomplete=skip_incomplete)
+        for path, is_recorded in zip(paths, recorded, strict=True)
+    ]
 
 
 def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete: bool) -> Log:
@@ -63,18 +82,13 @@ def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete:
             "logs without and with a known load"
         )
     t = table.numbers(["t"])[:, 0]
-    wrong = np.flatnonzero(np.diff(t) <= 0)
+    wrong = np.flatnonzero(np.diff(t) < 0)
     if len(wrong):
         row = int(wrong[0]) + 1
         raise table.error(row, "t", f"expected times that increase, got {t[row]:.6g} s after {t[row - 1]:.6g} s")
+    velocity = table.numbers(measured) if measured else None
     try:
-        log = Log(
-            name=table.path.name,
-            t=t,
-            q=table.numbers(positions),
-            qd=table.numbers(measured) if measured else None,
-            effort=table.numbers(driven),
-        )
+        log = Log.of_readings(table.path.name, t, table.numbers(positions), table.numbers(driven), velocity)
     except InvalidValueError as error:
         raise FileFormatError(table.path, None, "", str(error)) from error
     return with_gains(log, gains) if has_currents and gains is not None else log

@@ -17,7 +17,7 @@ from armwright.identification.feasible import Standard, arm_of, link_of
 from armwright.identification.fitting import Fit, Outlier
 from armwright.identification.friction import predicted
 from armwright.identification.groupings import groupings
-from armwright.identification.identifiability import LARGEST_ERROR, WeakParameter
+from armwright.identification.identifiability import LARGEST_ERROR, UNKNOWN, WeakParameter
 from armwright.identification.model import LINK_NAMES, DynamicModel
 from armwright.identification.signals import Motion, Preparation
 
@@ -228,7 +228,12 @@ class Identification:
             title="Hardly known, and what would tell",
             heads=("parameter", "known to", "motion", "then to"),
             rows=[
-                (each.name, f"{each.error:.0%}", each.motion or "none of one or two joints", f"{each.error_after:.0%}")
+                (
+                    each.name,
+                    _known_to(each.error),
+                    each.motion or "none of one or two joints",
+                    _known_to(each.error_after),
+                )
                 for each in self.weak
             ],
             numbers=(1, 3),
@@ -240,6 +245,7 @@ class Identification:
     def parameter_tables(self) -> Iterator[ResultTable]:
         """Give the base parameters with their errors: those of links, and those of drives, which combine nothing."""
         weak = {each.name for each in self.weak}
+        unknown = {each.name for each in self.weak if each.error >= UNKNOWN}
         combined = groupings(self.model)
         drives = [name.rstrip("0123456789") not in LINK_NAMES for name in self.model.base.names]
         for title, of_drives in (("links", False), ("drives", True)):
@@ -251,8 +257,8 @@ class Identification:
                 rows=[
                     (
                         self.model.base.names[k],
-                        f"{self.fit.values[k]:+z.5g}",
-                        f"{self.fit.errors[k]:.2g}",
+                        "not known" if self.model.base.names[k] in unknown else f"{self.fit.values[k]:+z.5g}",
+                        "-" if self.model.base.names[k] in unknown else f"{self.fit.errors[k]:.2g}",
                         *([] if of_drives else [combined[k]]),
                     )
                     for k in kept
@@ -296,6 +302,10 @@ def _by_log(predictions: Iterable[Prediction]) -> list[Prediction]:
         )
         for name, blocks in logs.items()
     ]
+
+
+def _known_to(error: float) -> str:
+    return f"{error:.0%}" if error < UNKNOWN else "not at all"
 
 
 def _outlier_text(outlier: Outlier) -> str:

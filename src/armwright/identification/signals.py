@@ -17,7 +17,7 @@ import numpy as np
 
 from armwright.arrays import Array, Flags, read_only
 from armwright.errors import InvalidValueError, TooFewError
-from armwright.identification.log import LEAST_SAMPLES, Log
+from armwright.identification.log import LEAST_MOTION, LEAST_SAMPLES, Log
 
 # Order of the filter, which is run forward and backward.
 _ORDER = 4
@@ -47,7 +47,8 @@ class Preparation:
         decimation: readings that are averaged to one equation.
         delay: by which positions are read later than efforts [s].
         border: what is cut off at both ends of a log, of which the filter knows too little [s].
-        slow: (n,) speeds below which a joint may stick: it has no equation there [rad/s] or [m/s].
+        slow: (n,) speeds below which a joint may stick: it has no equation there [rad/s] or [m/s]; infinite for a joint
+            that never moves.
     """
 
     cutoff: float
@@ -82,6 +83,8 @@ def preparation_of(logs: Sequence[Log], *, cutoff: float | None = None, decimati
     for log in logs:
         for piece in log.pieces():
             slow = np.maximum(slow, _slow(piece, cutoff))
+    # What is read of a joint that never moves is noise or rounding, and no speed.
+    slow[np.max([np.ptp(log.q, axis=0) for log in logs], axis=0) < LEAST_MOTION] = np.inf
     return Preparation(cutoff=cutoff, decimation=decimation, border=BORDER / cutoff, slow=slow)
 
 
