@@ -196,7 +196,7 @@ MISTAKES = {
         "[[document]]\ntitle = 'x'\ngives = ['geometry', 'sped']\n" + TURN,
         (
             "3: document 1, gives 2: expected some of geometry, positions, speeds, accelerations, efforts, masses, "
-            "inertias, drives, solids, hand, got 'sped'; did you mean 'speeds'?"
+            "inertias, drives, coupling, solids, hand, got 'sped'; did you mean 'speeds'?"
         ),
     ),
     "a misspelt key": (TURN + "alhpa_deg = 90\n", "3: joint 1, alhpa_deg: unknown key; did you mean 'alpha_deg'?"),

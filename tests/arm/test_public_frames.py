@@ -88,6 +88,7 @@ def quantities_of(arm: Arm) -> set[str]:
     found |= {"masses"} if any(link.mass for link in arm.links) else set()
     found |= {"inertias"} if any(link.inertia.any() for link in arm.links) else set()
     found |= {"solids"} if arm.base_solids or any(link.solids for link in arm.links) else set()
+    found |= {"coupling"} if arm.coupling is not None else set()
     found |= {"drives"} if arm.motor_values("inertia").any() else set()
     return found | ({"hand"} if math.isfinite(arm.reach) else set())
 

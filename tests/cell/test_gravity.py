@@ -9,7 +9,9 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.gravity import felt_gravity
+from armwright.arm.limits import Limits
 from armwright.arm.load import load_arm, read_arm
 from armwright.arm.model import STANDARD_GRAVITY, UPRIGHT_GRAVITY, Arm, Link
 from armwright.arm.urdf.reader import load_urdf
@@ -34,6 +36,8 @@ from armwright.motion.straight import straight_line
 from armwright.program import Source, compile as compile_program, known_cell
 from armwright.program.vm.interpreter import interpret, motion_warnings as warnings_of
 from armwright.program.vm.recording import Recording
+from armwright.report.run_data import run_page_data
+from armwright.report.run_summary import RunSummary
 from armwright.simulation.simulator import simulate
 from armwright.spatial.poses import homogeneous
 from armwright.tracing.emit_llvm import Target
@@ -158,6 +162,52 @@ def test_a_program_on_the_ceiling(rng: np.random.Generator) -> None:
     found = warnings_of(recording.stages, recording.cell)
     assert [one.code for one in found] == ["W401"]
     assert f"joint 2 of ARM_1 would need {stage.peak_effort[1]:.1f} N m" in found[0].message
+
+
+def test_drives_that_are_asked_for_too_much() -> None:
+    """Where drives are coupled, the warning is about the drive whose own limit is passed."""
+    C = np.eye(6)
+    C[2, 1] = -1.0
+    weak = [Limits(), Limits(), Limits(effort=4.0), Limits(), Limits(), Limits()]
+    arm = attrs.evolve(load_arm("puma560"), coupling=Coupling(matrix=C, limits=weak))
+    start = np.array((0.0, 0.3, 0.2, 0.0, 0.4, 0.0))
+    cell = Cell(
+        name="belt",
+        arms={"ARM_1": CellArm(arm=arm, base=np.eye(4), start=start)},
+        frames={"GOAL": Node(parent=WORLD, relation=forward(arm, start + 0.3))},
+    )
+
+    recording = moved(cell, "VAR GOAL : FRAME ; BEGIN MOVE ARM_1 TO GOAL ; END.")
+
+    (stage,), (stream,) = recording.stages, recording.streams
+    efforts = np.abs(stream.tau @ C).max(axis=0)
+    np.testing.assert_allclose(stage.peak_effort, [*np.abs(stream.tau).max(axis=0), *efforts], atol=AGREES)
+    assert stage.effort_shares(arm)[2] == pytest.approx(max(efforts[2] / 4, stage.peak_effort[2] / 89.4))
+    (found,) = warnings_of(recording.stages, recording.cell)
+    assert found.message.startswith(f"the drive of joint 3 of ARM_1 would need {efforts[2]:.1f} N m")
+
+
+def test_efforts_without_masses() -> None:
+    """Of an arm without masses no efforts are told: not in the data of a run, not in its tables, not on its page."""
+    arm = load_arm("kr6-r900")
+    start = np.array((0.0, -1.2, 1.4, 0.0, 0.5, 0.0))
+    cell = Cell(
+        name="light",
+        arms={"ARM_1": CellArm(arm=arm, base=np.eye(4), start=start)},
+        frames={"GOAL": Node(parent=WORLD, relation=forward(arm, start + 0.2))},
+    )
+    recording = moved(cell, "VAR GOAL : FRAME ; BEGIN MOVE ARM_1 TO GOAL ; END.")
+    summary = RunSummary(recording=recording, diagnostics=(), hint="")
+
+    (row,) = summary.as_data()["stages"]
+    assert row["peak_effort"] is None
+    assert row["effort_of_limit"] is None
+    assert "the masses of kr6-r900 (ARM_1) are unknown, and so are its efforts" in summary.notes
+    *_, table = summary.tables()
+    assert table.rows[0][-1] == "unknown"
+    page = run_page_data(recording, command="", diagnostics=())
+    assert page.arms[0].tau is None
+    assert page.stages[0].effort_share is None
 
 
 def test_motions_on_the_ceiling() -> None:

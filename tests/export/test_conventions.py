@@ -16,6 +16,7 @@ from armwright.export.conventions import ControllerArm, controller_arm, conventi
 from armwright.export.writers.posture import Posture, confdata, postures, status_and_turn
 from armwright.kinematics import forward, inverse
 from export.cases import HERE, mapped_arm, six_axes, wrist_arm
+from samples import Sample
 
 PUBLISHED: dict[str, list[dict[str, Any]]] = tomllib.loads((HERE / "published.toml").read_text(encoding="utf-8"))
 UR5E = six_axes(
@@ -186,6 +187,40 @@ def test_arms_that_do_not_fit() -> None:
     for name, convention in (("ur5", "kuka"), ("stanford", "abb"), ("ur5", "fanuc")):
         with pytest.raises(UnsupportedArmError, match=f"the axes of '{name}' cannot stand as"):
             controller_arm(load_arm(name), conventions()[convention])
+
+
+@pytest.mark.parametrize("name", conventions())
+def test_arms_of_a_convention(name: str) -> None:
+    """The arms that a convention lists stand as it says, their tools in its flange frame."""
+    for arm in conventions()[name].arms:
+        mapped = controller_arm(load_arm(arm), conventions()[name])
+
+        np.testing.assert_allclose(mapped.X_CT, np.eye(4), atol=1e-9, err_msg=arm)
+
+
+@pytest.mark.parametrize(
+    ("name", "target"), [("irb120", "rapid"), ("kr6-r900", "krl"), ("lrmate200id", "fanuc")], ids=lambda x: x
+)
+def test_arms_of_the_catalogue(name: str, target: str, sample: Sample) -> None:
+    """The catalogue's files of arms whose poses are published have flanges and joints as those have them."""
+    published = mapped_arm(target)
+    mine = controller_arm(load_arm(name), published.convention)
+    for rng in sample.cases(20):
+        shown = np.degrees(rng.uniform(-1.5, 1.5, 6)).tolist()
+
+        np.testing.assert_allclose(flange(mine, shown), flange(published, shown), atol=1e-9)
+
+
+def test_joint_3_of_an_irb2400() -> None:
+    """The controller of an arm with a parallelogram shows where its drives are: joint 3 together with joint 2."""
+    arm = load_arm("irb2400-12-155")
+    assert arm.coupling is not None
+    q = np.array([0.1, 0.2, -0.4, 0.3, 0.5, -0.6])
+    convention = find_convention(arm, None)
+    assert convention is conventions()["abb-parallelogram"]
+
+    np.testing.assert_allclose(controller_arm(arm, convention).joints(q), [0.1, 0.2, -0.2, 0.3, 0.5, -0.6], atol=1e-15)
+    np.testing.assert_allclose(controller_arm(arm, convention).joints(q), arm.coupling.drives(q), atol=1e-15)
 
 
 def test_names_of_conventions() -> None:

@@ -4,9 +4,11 @@ import json
 import re
 from itertools import pairwise
 
+import attrs
 import numpy as np
 import pytest
 
+from armwright.arm import Coupling
 from armwright.errors import CheckFailedError
 from armwright.export import export_run
 from armwright.export.checkers import (
@@ -293,6 +295,23 @@ def test_counts_of_drives() -> None:
     assert names == ",".join(f"joint_{i}" for i in range(1, 7))
     np.testing.assert_array_equal(first, np.rint(recording.cell.arms["ARM_1"].start / (2 * np.pi) * 1048576))
     assert len(rows) == np.ceil(recording.duration / 0.002 - 1e-6) + 1
+
+
+def test_counts_of_coupled_drives() -> None:
+    """Of coupled drives the counts are where the drives are; in counts of the joints the check finds the fault."""
+    before = recorded(PROGRAM, "urscript")
+    placed = before.cell.arms["ARM_1"]
+    C = np.eye(6)
+    C[2, 1] = -1.0
+    coupled = attrs.evolve(placed, arm=attrs.evolve(placed.arm, coupling=Coupling(matrix=C)))
+    recording = attrs.evolve(before, cell=attrs.evolve(before.cell, arms={**before.cell.arms, "ARM_1": coupled}))
+    (file,), (plain,) = drive_csv.write(recording, "ARM_1"), drive_csv.write(before, "ARM_1")
+    own, of_joints = (np.loadtxt(text.text.splitlines()[2:], delimiter=",", dtype=int) for text in (file, plain))
+
+    assert file.text.splitlines()[1] == ",".join(f"drive_{i}" for i in range(1, 7))
+    assert all(one.passed for one in compare_counts(file.text, recording, "ARM_1"))
+    assert not all(one.passed for one in compare_counts(plain.text, recording, "ARM_1"))
+    np.testing.assert_allclose(own, of_joints @ np.linalg.inv(C).T, atol=1)
 
 
 def test_events_beside_trajectories() -> None:

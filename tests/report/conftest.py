@@ -143,6 +143,7 @@ def stage_of(record: ArmRecord, t0: float, t1: float, kind: Any, to: tuple[str, 
         speed=100.0,
         peak_speed=np.abs(record.qd[rows]).max(axis=0),
         peak_effort=np.abs(record.tau[rows]).max(axis=0),
+        effort_share=np.abs(record.tau[rows]).max(axis=0) / [joint.effort for joint in record.joints],
         hand_length=length,
         **more,
     )

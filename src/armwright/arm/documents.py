@@ -19,6 +19,7 @@ QUANTITIES = (
     "masses",
     "inertias",
     "drives",
+    "coupling",
     "solids",
     "hand",
 )

@@ -348,6 +348,11 @@ class Arm:
         """Which joints rotate, (n,)."""
         return read_only(np.array([joint.revolute for joint in self.joints]))
 
+    @property
+    def massless(self) -> bool:
+        """Whether no link has a mass or an inertia, so that efforts say nothing of the arm."""
+        return not any(link.mass or link.inertia.any() for link in self.links)
+
     def motor_values(self, name: str) -> Array:
         """Return one of the numbers of all motors, (n,), by its name in ``Motor``."""
         return np.array([getattr(motor, name) for motor in self.motors])

@@ -20,10 +20,11 @@ class Output:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Encoders:
-    """How drives count the positions of the joints of an arm.
+    """How drives count their positions behind the gears: those of the joints, where no drives are coupled.
 
     Attributes:
-        counts: (n,) per revolution of a joint, its gear included, or per metre of a prismatic one.
+        counts: (n,) per revolution of a joint, its gear included, or per metre of a prismatic one; of coupled drives
+            per revolution or metre of the drive behind its gear.
         offset: (n,) counts at position zero.
         signs: (n,) 1 where a drive counts up with its joint, else -1.
         period: at which the drives take positions [s]; None for that of the servo.

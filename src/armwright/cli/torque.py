@@ -47,7 +47,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.dynamics.equation_of_motion import terms
 
     model = load_arm(arm)
-    if not any(link.mass or link.inertia.any() for link in model.links):
+    if model.massless:
         print(f"armwright: note: {model.name} has no masses: its own efforts are zero below", file=sys.stderr)
     body = Link() if load is None else read_payload(load)
     tool_wrench = None if wrench is None else numbers(wrench, 6, "--wrench")

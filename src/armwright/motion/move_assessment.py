@@ -31,13 +31,17 @@ class MoveAssessment:
 
     @uses.default
     def _uses(self) -> dict[LimitName, Array]:
-        return limit_use(self.move.arm, self.move.trajectory)
+        uses = limit_use(self.move.arm, self.move.trajectory)
+        # Without masses the efforts are none of the arm.
+        return {name: use for name, use in uses.items() if name != "effort" or not self.move.arm.massless}
 
     @property
     def notes(self) -> tuple[str, ...]:
         """The duration and the branches, the certificate, and the detours."""
         move = self.move
         notes = [f"{move.arm.name}: {move.trajectory.duration:.3f} s, {move.label}"]
+        if move.arm.massless:
+            notes.append(f"the masses of {move.arm.name} are unknown, and so are its efforts")
         if move.certificate:
             notes.append(f"certificate {move.certificate}")
         for start, end, detour in zip(self.names, self.names[1:], move.detours, strict=False):
@@ -90,6 +94,7 @@ class MoveAssessment:
             for i, use in enumerate(self.uses.values())
             for joint in np.flatnonzero(use > 1 + ROUNDING).tolist()
         ]
+        *first, last = self.uses
         yield ResultTable(
             title="",
             heads=heads,
@@ -97,5 +102,5 @@ class MoveAssessment:
             numbers=range(1, len(heads)),
             exceeded=exceeded,
             section_ends=(len(self.names) - 1,),
-            remark="speed, acceleration and effort in percent of their limits",
+            remark=f"{', '.join(first)} and {last} in percent of their limits",
         )

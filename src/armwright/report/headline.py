@@ -36,11 +36,11 @@ def run_headline(data: RunPage) -> Iterator[Tile]:
 
 def _peak_effort(data: RunPage, arms: dict[str, ArmRecord]) -> Iterator[Tile]:
     shares = [
-        (effort / joint.effort, stage, joint.name)
+        (share, stage, joint.name)
         for stage in data.stages
-        if stage.peak_effort is not None and stage.arm in arms
-        for effort, joint in zip(stage.peak_effort, arms[stage.arm].joints, strict=True)
-        if 0 < joint.effort < float("inf")
+        if stage.effort_share is not None and stage.arm in arms
+        for share, joint in zip(stage.effort_share, arms[stage.arm].joints, strict=True)
+        if share > 0
     ]
     if shares:
         share, stage, joint = max(shares, key=lambda one: one[0])

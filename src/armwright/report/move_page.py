@@ -4,9 +4,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.detour import Detour
+from armwright.motion.limited import by_joint, limited_efforts
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples
@@ -42,13 +44,14 @@ def move_page(
         move: the move.
         file: the file of its poses.
         samples: the motion at the ticks of a servo.
-        tau: (k, n) efforts at the samples, drives included [N m] or [N].
+        tau: (k, n) efforts at the samples, drives included [N m] or [N]; those of an arm without masses are left out.
         title: heading of the page.
         name: name of the file of the poses.
         command: the command line.
         notes: warnings and remarks.
     """
-    motion = (samples.times, samples.q, samples.qd, samples.qdd, tau)
+    known = None if move.arm.massless else tau
+    motion = (samples.times, samples.q, samples.qd, samples.qdd, known)
     return RunPage(
         title=title,
         program_name=name,
@@ -60,7 +63,7 @@ def move_page(
         duration=move.trajectory.duration,
         messages=[Message(severity="note", text=note) for note in notes],
         effects=list(_effects(move, file)),
-        stages=list(_stages(move, file, samples, tau)),
+        stages=list(_stages(move, file, samples, known)),
         arms=[arm_record(_ARM, move.arm, motion)],
         animation=_animation(move, file),
     )
@@ -75,7 +78,12 @@ def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
         )
 
 
-def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterator[StageRow]:
+def _effort_shares(arm: Arm, tau: Array) -> Array:
+    """Return (n,) the largest part of its limit of effort of each joint, or its drive, from efforts (k, n)."""
+    return by_joint(arm, np.abs(limited_efforts(arm, tau)).max(axis=0) / arm.all_limits.effort)
+
+
+def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array | None) -> Iterator[StageRow]:
     for i, (t0, t1) in enumerate(zip(move.times[:-1].tolist(), move.times[1:].tolist(), strict=True)):
         hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _SAMPLES)))[:, :3, 3]
         during = (samples.times >= t0 - 1e-12) & (samples.times <= t1 + 1e-12)
@@ -92,7 +100,8 @@ def _stages(move: Move, file: PosesFile, samples: Samples, tau: Array) -> Iterat
             to=(file.names[i + 1],),
             speed=100.0,
             peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),
-            peak_effort=np.abs(tau[during]).max(axis=0).tolist(),
+            peak_effort=None if tau is None else np.abs(tau[during]).max(axis=0).tolist(),
+            effort_share=None if tau is None else _effort_shares(move.arm, tau[during]).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
             deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
             badges=[_detour_badge(detour)] if detour and detour.method != "line" else [],

@@ -124,7 +124,8 @@ class StageRow:
         to: its target frames; the last is the goal.
         speed: the speed in the program, 100 being normal.
         peak_speed: n largest joint speeds [rad/s] or [m/s].
-        peak_effort: n largest torques [N m] or forces [N]; None where no dynamics was computed.
+        peak_effort: n largest torques [N m] or forces [N]; None where no dynamics was computed, or no masses are known.
+        effort_share: n largest parts of the limits of effort, of a joint or its drive; 0 without one; None as before.
         hand_length: length of the path of the tool [m].
         deviation: largest distance from the straight line [m]; None without a line.
         badges: remarks.
@@ -140,6 +141,7 @@ class StageRow:
     speed: float
     peak_speed: Sequence[float]
     peak_effort: Sequence[float] | None = None
+    effort_share: Sequence[float] | None = None
     hand_length: float
     deviation: float | None = None
     badges: Sequence[StageBadge] = ()

@@ -194,11 +194,8 @@ def _record(motion: ReplayedMotion, start: float, base: Array) -> ArmRecord:
     t, q = states.t[rows] + (shift if motion.planned is not None else 0.0) - start, states.q[rows]
     qd = _or_rates(t, q, states.qd[rows])
     tau = states.tau[rows]
-    known_effort = bool(np.isfinite(tau).all())
-    motion_arrays = (t, q, qd, _or_rates(t, qd, np.full_like(qd, np.nan)), tau if known_effort else np.zeros_like(q))
-    record = arm_record(motion.name, arm, motion_arrays, base)
-    if not known_effort:
-        record = attrs.evolve(record, tau=None)
+    qdd = _or_rates(t, qd, np.full_like(qd, np.nan))
+    record = arm_record(motion.name, arm, (t, q, qd, qdd, tau if np.isfinite(tau).all() else None), base)
     if motion.tracking is None:
         return record
     return attrs.evolve(record, measured=_measured(motion.tracking, motion.measured, start))

@@ -7,6 +7,7 @@ from typing import TypeVar
 import attrs
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import base_name
@@ -72,7 +73,7 @@ def run_page_data(
             *(Message(severity="note", text=text) for text in notes),
         ],
         effects=_effects(recording),
-        stages=[_stage_row(run, source.line(run.span.start)) for run in stages],
+        stages=[_stage_row(run, source.line(run.span.start), cell.arms[run.arm].arm) for run in stages],
         arms=_arm_records(recording),
         animation=animation,
         collisions=collision_text(recording),
@@ -93,7 +94,9 @@ def _arm_records(recording: Recording) -> list[ArmRecord]:
     records = []
     for s in recording.streams:
         arm = recording.cell.arms[s.arm]
-        record = arm_record(s.arm, arm.arm, (s.t, s.q, s.qd, s.qdd, s.tau), arm.base)
+        # Without masses the efforts are none of the arm.
+        tau = None if arm.arm.massless else s.tau
+        record = arm_record(s.arm, arm.arm, (s.t, s.q, s.qd, s.qdd, tau), arm.base)
         if s.arm in measured:
             record = attrs.evolve(record, measured=measured_motion(s, measured[s.arm]))
         records.append(record)
@@ -121,7 +124,7 @@ def _effects(recording: Recording) -> list[Effect]:
     return effects.map(shown).join(*omitted)
 
 
-def _stage_row(run: RunStage, line: int) -> StageRow:
+def _stage_row(run: RunStage, line: int, arm: Arm) -> StageRow:
     return StageRow(
         t0=run.t0,
         t1=run.t1,
@@ -131,7 +134,8 @@ def _stage_row(run: RunStage, line: int) -> StageRow:
         to=run.goal_names,
         speed=run.speed,
         peak_speed=run.motion.peaks(1).tolist(),
-        peak_effort=run.peak_effort.tolist(),
+        peak_effort=None if arm.massless else run.peak_effort[: arm.n].tolist(),
+        effort_share=None if arm.massless else run.effort_shares(arm).tolist(),
         hand_length=run.length,
         deviation=run.stage.deviation,
         badges=list(stage_badges(run)),

@@ -209,9 +209,9 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "planned_path": None if run.path is None else run.path.as_data(),
         "peak_speed": _rounded_list(motion.peaks(1)),
         "peak_acceleration": _rounded_list(motion.peaks(2)),
-        "peak_effort": _rounded_list(run.peak_effort),
+        "peak_effort": None if arm.massless else _rounded_list(run.peak_effort[: arm.n]),
         "speed_of_limit": _rounded_list(motion.peaks(1) / arm.limits.speed),
-        "effort_of_limit": _rounded_list(run.peak_effort / arm.limits.effort),
+        "effort_of_limit": None if arm.massless else _rounded_list(run.effort_shares(arm)),
     }
 
 

@@ -60,9 +60,15 @@ class RunSummary:
         collisions = (
             "Collisions are not checked." if recording.checked is None else f"Collisions: {collision_text(recording)}."
         )
+        unknown = [
+            f"the masses of {placed.arm.name} ({name}) are unknown, and so are its efforts"
+            for name, placed in recording.cell.arms.items()
+            if placed.arm.massless
+        ]
         return (
             *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
             numbers,
+            *unknown,
             *([text] if (text := physics_text(recording)) else []),
             collisions,
         )
@@ -99,9 +105,14 @@ class RunSummary:
             if run is None:
                 rows.append(("", omission_text(stages.omitted, self.hint), *[""] * 6))
                 continue
-            stage, limits = run.stage, self.recording.cell.arms[run.arm].arm.limits
+            stage, arm = run.stage, self.recording.cell.arms[run.arm].arm
             peaks = []
-            for column, shares in ((6, run.motion.peaks(1) / limits.speed), (7, run.peak_effort / limits.effort)):
+            # Without masses the efforts are none of the arm.
+            efforts = None if arm.massless else run.effort_shares(arm)
+            for column, shares in ((6, run.motion.peaks(1) / arm.limits.speed), (7, efforts)):
+                if shares is None:
+                    peaks.append("unknown")
+                    continue
                 joint = int(shares.argmax())
                 peaks.append(f"{shares[joint] * 100:.0f} % j{joint + 1}")
                 if shares[joint] > 1 + 1e-9:

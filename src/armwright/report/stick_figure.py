@@ -9,6 +9,7 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.report.limit_spans import limit_spans
 from armwright.report.page import ArmRecord, JointInfo
 
@@ -17,18 +18,21 @@ _CHART_ROWS = 1500
 
 
 def arm_record(
-    name: str, arm: Arm, motion: tuple[Array, Array, Array, Array, Array], base: Array | None = None
+    name: str, arm: Arm, motion: tuple[Array, Array, Array, Array, Array | None], base: Array | None = None
 ) -> ArmRecord:
     """Return the motion of an arm for the page, at as many instants as a chart shows.
 
     Args:
         name: its name in the program.
         arm: the arm, with n joints.
-        motion: (k,) times [s]; (k, n) positions, speeds, accelerations and efforts of its joints.
+        motion: (k,) times [s]; (k, n) positions, speeds, accelerations and efforts of its joints, which may be unknown.
         base: (4, 4) pose of the arm in the world; the world itself when left out.
     """
-    at_limits = list(limit_spans(arm.limits, motion))
-    t, q, qd, qdd, tau = (values[thinned_rows(len(motion[0]))] for values in motion)
+    t, q, qd, qdd, tau = motion
+    all_states = *(limited_positions(arm, x) for x in (q, qd, qdd)), None if tau is None else limited_efforts(arm, tau)
+    at_limits = [attrs.evolve(span, joint=span.joint % arm.n) for span in limit_spans(arm.all_limits, (t, *all_states))]
+    rows = thinned_rows(len(t))
+    t, q, qd, qdd, tau = t[rows], q[rows], qd[rows], qdd[rows], None if tau is None else tau[rows]
     joints = [
         JointInfo(name=f"joint {i}", kind=joint.kind, **attrs.asdict(joint.limits))
         for i, joint in enumerate(arm.joints, 1)

@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.model import CellArm
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.program.vm.recording import Recording, Stream
 
 # Rows of a course, and points of a path, that pages get.
@@ -63,22 +64,24 @@ def _figures(stream: Stream, placed: CellArm, path: Array) -> dict[str, float | 
     """Return the figures of a motion.
 
     Path length of the tool [m] and its highest speed [m/s], work of the drives [J], and the highest speed, acceleration
-    and effort of joints as a part of the limit, with the number of the joint.
+    and effort of joints, or their drives, as a part of the limit, with the number of the joint. None is
+    what is unknown: efforts and work of an arm without masses, too.
     """
-    limits, period = placed.arm.limits, float(stream.t[1] - stream.t[0]) if len(stream.t) > 1 else 1.0
+    arm, limits = placed.arm, placed.arm.all_limits
+    period = float(stream.t[1] - stream.t[0]) if len(stream.t) > 1 else 1.0
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     figures: dict[str, float | int | None] = {
         "path_length": float(steps.sum()),
         "tool_speed": float(steps.max(initial=0.0)) / period,
-        "work": float(np.abs(stream.tau * stream.qd).sum() * period),
+        "work": None if arm.massless else float(np.abs(stream.tau * stream.qd).sum() * period),
     }
     for name, values, most in (
-        ("speed", stream.qd, limits.speed),
-        ("acceleration", stream.qdd, limits.acceleration),
-        ("effort", stream.tau, limits.effort),
+        ("speed", limited_positions(arm, stream.qd), limits.speed),
+        ("acceleration", limited_positions(arm, stream.qdd), limits.acceleration),
+        ("effort", limited_efforts(arm, stream.tau), limits.effort),
     ):
         shares = np.abs(values).max(axis=0, initial=0.0) / most
-        known = np.isfinite(most)
+        known = np.isfinite(most) & (name != "effort" or not arm.massless)
         figures[f"{name}_share"] = float(shares[known].max()) if known.any() else None
-        figures[f"{name}_joint"] = int(np.where(known, shares, -1.0).argmax()) + 1 if known.any() else None
+        figures[f"{name}_joint"] = int(np.where(known, shares, -1.0).argmax()) % arm.n + 1 if known.any() else None
     return figures

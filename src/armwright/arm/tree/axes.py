@@ -60,15 +60,16 @@ class Frames:
     leaning: tuple[float, ...]
 
 
-def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Frames:
+def frames_of(joints: Sequence[Array], axes: Sequence[Array], X_BT: Array, size: float) -> Frames:
     """Return the frames of a chain of joint axes.
 
-    The z axes point as the joint axes do, so joint positions keep their signs. The last frame is the one before it,
-    moved by the last joint.
+    The z axes point as the joint axes do, so joint positions keep their signs. The last frame is that of the tool where
+    its z axis is on the last joint axis, as that of a flange is; else it is the one before it, moved by the last joint.
 
     Args:
         joints: n poses (4, 4) of frames on the axes.
         axes: n unit vectors (3,).
+        X_BT: (4, 4) pose of the tool.
         size: of the arm; lengths are rounded beside it [m].
 
     Source:
@@ -87,7 +88,9 @@ def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Fr
         X = behind
         rows.append(row)
         poses.append(X)
-    return Frames(first=first, rows=(*rows, Row()), poses=(*poses, X), leaning=tuple(leaning))
+    last = _row_to_tool(inverse(X) @ X_BT, size * ROUNDING)
+    flange = X if last == Row() else X_BT
+    return Frames(first=first, rows=(*rows, last), poses=(*poses, flange), leaning=tuple(leaning))
 
 
 def dh_form(
@@ -108,7 +111,7 @@ def dh_form(
     poses = list(accumulate(origins, np.matmul))
     X_BT = poses[-1] @ tool
     size = length_of(poses, X_BT)
-    frames = frames_of(poses, [X[:3, :3] @ axis for X, axis in zip(poses, axes, strict=True)], size)
+    frames = frames_of(poses, [X[:3, :3] @ axis for X, axis in zip(poses, axes, strict=True)], X_BT, size)
     rows = [attrs.evolve(joint, **attrs.asdict(row)) for joint, row in zip(joints, frames.rows, strict=True)]
     steps = [cleared_pose(inverse(X) @ pose, size) for X, pose in zip(frames.poses, poses, strict=True)]
     carried = [
@@ -183,6 +186,15 @@ def _row(X: Array, p: Array, u: Array, tiny: float) -> Row:
     theta = math.atan2(float(np.cross(x, normal) @ z), float(x @ normal))
     a, d = (0.0 if abs(length) <= tiny else length for length in (a, d))
     return Row(theta=_rounded_to_right_angle(theta), d=d, a=a, alpha=_rounded_to_right_angle(alpha))
+
+
+def _row_to_tool(X: Array, tiny: float) -> Row:
+    """Return the row that leads to a tool (4, 4), seen from the frame before it, if its z axis is on the joint axis."""
+    if np.linalg.norm(X[:2, 3]) > tiny or np.linalg.norm(X[:2, 2]) > ROUNDING:
+        return Row()
+    theta = _rounded_to_right_angle(math.atan2(float(X[1, 0]), float(X[0, 0])))
+    d = 0.0 if abs(X[2, 3]) <= tiny else float(X[2, 3])
+    return Row(theta=theta, d=d, alpha=0.0 if X[2, 2] > 0 else math.pi)
 
 
 def _rounded_to_right_angle(angle: float) -> float:

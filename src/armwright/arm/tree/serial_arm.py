@@ -57,7 +57,7 @@ def serial_arm(
     chain = chain_of(tree, base, tip)
     poses = [each.X_BJ for each in chain.moving]
     size = length_of(poses, chain.X_BT)
-    frames = frames_of(poses, [each.axis for each in chain.moving], size)
+    frames = frames_of(poses, [each.axis for each in chain.moving], chain.X_BT, size)
     joints, links, motors, notes = [], [], [], [*chain.notes, *_leaning(chain, frames)]
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
         limits, unknown = moving.joint.limits()

@@ -75,15 +75,17 @@ def compare_counts(text: str, recording: Recording, arm_name: str) -> tuple[Comp
     counts = np.loadtxt(io.StringIO(text), delimiter=",", skiprows=2, dtype=np.int64, ndmin=2)
     if counts.shape[1] != arm.n:
         raise CheckError(f"line 3: expected {arm.n} columns")
-    unit = _units(arm, encoders)
-    q = (counts - encoders.offset) * unit
+    unit, C = _units(arm, encoders), np.eye(arm.n) if arm.coupling is None else arm.coupling.matrix
+    m = (counts - encoders.offset) * unit
     mine = [stage for stage in recording.stages if stage.arm == arm_name]
     times: Array = np.arange(len(counts), dtype=np.float64) * period
-    plan = _plan(times, mine, placed.start)
-    speeds = np.maximum(np.abs(np.diff(q, axis=0)) - np.abs(unit), 0.0) / period / arm.limits.speed
-    last = np.abs(q[-1] - (mine[-1].motion(mine[-1].motion.duration) if mine else placed.start)) / np.abs(unit)
+    plan = np.linalg.solve(C, _plan(times, mine, placed.start).T).T
+    joint_ways, rounded = np.abs(np.diff(m, axis=0) @ C.T), np.abs(C) @ np.abs(unit)
+    speeds = np.maximum(joint_ways - rounded, 0.0) / period / arm.limits.speed
+    end = mine[-1].motion(mine[-1].motion.duration) if mine else placed.start
+    last = np.abs(m[-1] - np.linalg.solve(C, end)) / np.abs(unit)
     return (
-        _comparison("positions", counts.size, _largest((q - plan) / unit), 0.5 + _ROUNDING, "counts"),
+        _comparison("positions", counts.size, _largest((m - plan) / unit), 0.5 + _ROUNDING, "counts"),
         _comparison("positions at the end", arm.n, float(last.max()), 0.5 + _ROUNDING, "counts"),
         _comparison("counts beyond 32 bits", counts.size, int((counts != counts.astype(np.int32)).sum()), 0),
         _comparison("joint speeds, of the limits", counts.size, _largest(speeds), 1 + _ROUNDING),

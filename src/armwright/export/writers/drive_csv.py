@@ -1,4 +1,4 @@
-"""CSV for drives: the positions of all joints in counts of their encoders, at the period of the drives."""
+"""CSV for drives: the positions of all drives in counts of their encoders, at the period of the drives."""
 
 import math
 
@@ -34,34 +34,37 @@ def write(recording: Recording, arm_name: str) -> list[ControllerFile]:
         helps = [f"write `[arms.{arm_name}.encoders]` with `counts`, `offset`, `signs` and `period_ms`"]
         raise refusal(source, "E618", text, span, f"{arm_name} moves here", helps=helps)
     period = encoders.period or recording.cell.period
-    motion = arm_motion(recording, arm_name)
+    motion, coupling = arm_motion(recording, arm_name), placed.arm.coupling
     ticks = np.arange(math.ceil(motion.duration / period - _TICK_TOLERANCE) + 1)
-    counts = _counts(motion(ticks * period), encoders, placed.arm.revolute)
+    q = motion(ticks * period)
+    counts = _counts(q if coupling is None else coupling.drives(q), encoders, placed.arm.revolute)
     if ((counts < _SMALLEST) | (counts > _LARGEST)).any():
         row, joint = (int(x) for x in np.argwhere((counts < _SMALLEST) | (counts > _LARGEST))[0])
         time = row * period
         at = next((stage.span for stage in mine if stage.t1 >= time), span)
-        text = f"joint {joint + 1} of {arm_name} comes to {counts[row, joint]:,.0f} counts, which 32 bits do not hold"
+        drive = f"the drive of joint {joint + 1} of {arm_name}"
+        text = f"{drive} comes to {counts[row, joint]:,.0f} counts, which 32 bits do not hold"
         raise refusal(source, "E618", text, at, "on this MOVE", helps=["set another `offset` of its encoder"])
+    word = "joint" if coupling is None else "drive"
     half = float((np.where(placed.arm.revolute, 2 * np.pi, 1.0) / encoders.counts).max()) / 2
     notes = (
         f"positions are whole counts: they are off by up to half a count, {half:.2g} rad or m",
         "outputs and texts are not part of the table: events.json has them with their times",
     )
-    return [ControllerFile(name=f"{arm_name}.csv", text=_text(counts, period), approximations=notes)]
+    return [ControllerFile(name=f"{arm_name}.csv", text=_text(counts, period, word), approximations=notes)]
 
 
-def _counts(q: Array, encoders: Encoders, revolute: Flags) -> Array:
-    """Return joint positions (k, n) in counts, rounded, as floats."""
-    turns = q / np.where(revolute, 2 * np.pi, 1.0)
+def _counts(m: Array, encoders: Encoders, revolute: Flags) -> Array:
+    """Return positions (k, n) of the drives in counts, rounded, as floats."""
+    turns = m / np.where(revolute, 2 * np.pi, 1.0)
     return np.asarray(np.rint(encoders.offset + encoders.signs * turns * encoders.counts))
 
 
-def _text(counts: Array, period: float) -> str:
-    joints = ",".join(f"joint_{i}" for i in range(1, counts.shape[1] + 1))
+def _text(counts: Array, period: float, word: str) -> str:
+    columns = ",".join(f"{word}_{i}" for i in range(1, counts.shape[1] + 1))
     line = ",".join(["%d"] * counts.shape[1]) + "\n"
     whole = counts.astype(np.int64)
-    pieces = [f"# period {period:.9g} s; positions in counts\n{joints}\n"]
+    pieces = [f"# period {period:.9g} s; positions in counts\n{columns}\n"]
     for first in range(0, len(whole), _ROWS):
         block = whole[first : first + _ROWS]
         pieces.append(line * len(block) % tuple(block.ravel().tolist()))

@@ -59,7 +59,7 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     if motion.stage_index >= 0:
         executed = join([last.trajectory.until(local), braking])
         efforts_before = [] if last.tau is None else [last.tau[: round(local / period)]]
-        peak, when = peak_efforts(np.concatenate([*efforts_before, tau]), period)
+        peak, when = peak_efforts(arm, np.concatenate([*efforts_before, tau]), period)
         stage, length = machine.state.stages[motion.stage_index], tool_path_length(arm, executed)
         machine.state.stages[motion.stage_index] = attrs.evolve(
             stage, motion=executed, length=length, peak_effort=peak, peak_time=when, stopped=True
@@ -103,11 +103,12 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
     if last.tau is None or done_ticks >= len(last.tau):
         return
     remaining_wrenches = ToolWrenches(last.t0, np.concatenate([np.zeros((done_ticks, 6)), push.wrenches]))
-    tau = trajectory_efforts(machine.cell.arms[arm].arm, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
+    model = machine.cell.arms[arm].arm
+    tau = trajectory_efforts(model, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
     tau[:done_ticks] = last.tau[:done_ticks]
     machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
     if stage_index is not None:
-        peak, when = peak_efforts(tau, period)
+        peak, when = peak_efforts(model, tau, period)
         stage = machine.state.stages[stage_index]
         machine.state.stages[stage_index] = attrs.evolve(stage, peak_effort=peak, peak_time=when)
 

@@ -14,6 +14,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.cell.hardware import Hardware, Mishap
 from armwright.cell.model import Cell
+from armwright.motion.limited import limited_label
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
@@ -228,7 +229,7 @@ def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic,
     """Return the warnings about stages that were run in a cell.
 
     For every straight line that was gone round, every VIA with stops because corners cannot be rounded, every stage
-    that comes too near to other bodies, and every joint asked for too much effort.
+    that comes too near to other bodies, and every joint or drive asked for too much effort.
     """
     diagnostics = []
     for stage in stages:
@@ -237,8 +238,8 @@ def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic,
         if (warning := clearance_warning(stage, cell.clearance)) is not None:
             diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
-        excessive = np.flatnonzero(stage.peak_effort / arm.limits.effort > 1)
-        diagnostics += [_effort_warning(stage, arm, joint) for joint in excessive.tolist()]
+        excessive = np.flatnonzero(stage.peak_effort / arm.all_limits.effort > 1)
+        diagnostics += [_effort_warning(stage, arm, number) for number in excessive.tolist()]
     return tuple(diagnostics)
 
 
@@ -248,16 +249,16 @@ def run_diagnostics(recording: Recording) -> tuple[Diagnostic, ...]:
     return (*motion_warnings(recording.stages, recording.cell), *failed)
 
 
-def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
-    needed = float(stage.peak_effort[joint])
-    unit = "N m" if arm.joints[joint].revolute else "N"
-    limit = arm.joints[joint].limits.effort
+def _effort_warning(stage: RunStage, arm: Arm, number: int) -> Diagnostic:
+    """Return the warning about a joint, or the drive of one: see ``Arm.all_limits``."""
+    needed, limit = float(stage.peak_effort[number]), float(arm.all_limits.effort[number])
+    unit = arm.joints[number % arm.n].units.effort
     return Diagnostic(
         code="W401",
         severity=Severity.WARNING,
-        message=f"{arm.joint_label(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
+        message=f"{limited_label(arm, number)} of {stage.arm} would need {needed:.1f} {unit}, "
         f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
-        label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.goal_names[-1]}",
+        label=f"at {stage.t0 + stage.peak_time[number]:.3f} s, in {stage.stage.kind} to {stage.goal_names[-1]}",
         helps=(f"a speed below {stage.speed:g} reduces the effort due to acceleration, but not that due to gravity",),
     )

@@ -282,7 +282,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
         refuse_contact(machine, process, motion, goal_names[-1], pressed)
     if touch is not None:
         motion.first_contact = (trajectory, touch - machine.now)
-    motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(tau, period)
+    motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(arm, tau, period)
     machine.state.stages.append(
         RunStage(
             t0=machine.now,

@@ -18,6 +18,7 @@ from armwright.cell.part_poses import PartTrack
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.files.csv_text import csv_line
 from armwright.motion.efforts import without_rounding
+from armwright.motion.limited import by_joint, limited_efforts
 from armwright.motion.plan import PlannedStage
 from armwright.motion.trajectory import Trajectory
 from armwright.notebook import html_table
@@ -86,8 +87,8 @@ class RunStage:
             A stop keeps to the path of the plan, so the path deviation of the plan holds for it too.
         length: of the path that the gripper went [m].
         peak_effort: (n,) largest efforts on the servo ticks of that motion, with what pushes on the gripper [N m] or
-            [N].
-        peak_time: (n,) when, since it began [s].
+            [N]; (2 n,) with those of the drives behind, where coupled drives have limits: see ``Arm.all_limits``.
+        peak_time: (n,) or (2 n,) when, since it began [s].
         stopped: whether it was stopped on its path.
         clearance: how near it was to come to other bodies; None where that is not looked at.
         path: that was planned past other bodies; None where the straight one of the joints was free.
@@ -106,6 +107,10 @@ class RunStage:
     stopped: bool = False
     clearance: StageClearance | None = None
     path: PlannedPath | None = None
+
+    def effort_shares(self, arm: Arm) -> Array:
+        """Return (n,) which part of its limit of effort each joint of the arm, or its drive, was asked for at most."""
+        return by_joint(arm, self.peak_effort / arm.all_limits.effort)
 
     @property
     def duration(self) -> float:
@@ -351,9 +356,9 @@ def _efforts(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Arr
     return tau
 
 
-def peak_efforts(tau: Array, period: float) -> tuple[Array, Array]:
-    """Return the largest efforts (n,) on servo ticks (k, n), and when, since the first [s]."""
-    sizes = np.abs(tau)
+def peak_efforts(arm: Arm, tau: Array, period: float) -> tuple[Array, Array]:
+    """Return the largest efforts of all that has limits, and when [s], from those of joints (k, n) on servo ticks."""
+    sizes = np.abs(limited_efforts(arm, tau))
     return sizes.max(axis=0), sizes.argmax(axis=0) * period
 
 
