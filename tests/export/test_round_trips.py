@@ -93,11 +93,12 @@ def test_blends_become_zones(target: str) -> None:
 
 @pytest.mark.parametrize("target", LANGUAGES)
 def test_rests_and_nothing(target: str) -> None:
-    """A MOVE to where the arm is takes the time it is given, and none without that."""
+    """A MOVE to where the arm is takes the time it is given, and none without that; the end switches devices off."""
     statements = plan_statements(recorded(BLENDED, target), "x").statements
 
-    assert [type(one).__name__ for one in statements[3:]] == ["SetOutput", "Say", "Wait"]
-    assert statements[-1].seconds == pytest.approx(0.5)
+    assert [type(one).__name__ for one in statements[3:]] == ["SetOutput", "Say", "Wait", "SetOutput"]
+    assert statements[-2].seconds == pytest.approx(0.5)
+    assert (statements[3].on, statements[-1].on) == (True, False)
 
 
 @pytest.mark.share(0.002)
