@@ -15,10 +15,10 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"
 
 
-def debug(*commands: str, program: Path = BENCH) -> tuple[int, list[str]]:
+def debug(*commands: str, program: Path = BENCH, cell: Path = STANFORD) -> tuple[int, list[str]]:
     """Type commands into a debugger; return its exit status and what it says, without its prompts."""
     done = subprocess.run(
-        [sys.executable, "-m", "armwright", "debug", str(program), "--cell", str(STANFORD)],
+        [sys.executable, "-m", "armwright", "debug", str(program), "--cell", str(cell)],
         input="".join(f"{one}\n" for one in commands),
         capture_output=True,
         text=True,
@@ -47,6 +47,34 @@ def test_steps_and_values() -> None:
     assert "(1,0,0, 0,-1,0, 0,0,-1, 0.4,0.15,0.15)" in said
     assert "*1  program, line 11: move ARM-1 to obj1 with approach = apf1 ," in said
     assert said[-2:] == ["    0.000 s  program, line 10", "   10      affix apf1 to obj1 at t1 ;"]
+
+
+def test_inputs_by_hand(tmp_path: Path) -> None:
+    """An input is switched while the program stands still, and the program goes on with it."""
+    program = tmp_path / "door.rlo"
+    text = "BEGIN\n  PAUSE 1 ;\n  WAIT UNTIL NOT INPUT(door_closed) WITHIN 2 ;\n  PRINT(TIME)\nEND.\n"
+    program.write_text(text, encoding="utf-8")
+    status, said = debug(
+        "n",
+        "set input(Door_Closed) = off",
+        "set ANALOG(oil) = 12.5",
+        "p INPUT(door_closed)",
+        "set INPUT(door_close) = 1",
+        "set INPUT(door_closed) = 2",
+        "set INPUT(door_closed) = soon",
+        "set ANALOG(oil) = nan",
+        "c",
+        program=program,
+        cell=EXAMPLES / "press_cell.toml",
+    )
+
+    assert status == 0
+    assert {"false", "12.5", "false  condition"} < set(said)
+    assert any("has no input DOOR_CLOSE; did you mean DOOR_CLOSED?" in line for line in said)
+    assert any("is digital: expected 0 or 1, got 2" in line for line in said)
+    assert "expected TRUE, FALSE or a number, got `soon`" in said
+    assert any("expected a finite number, got nan" in line for line in said)
+    assert any('PRINT "1"' in line for line in said)
 
 
 def test_whole_words() -> None:

@@ -21,7 +21,7 @@ TABLE = {
 }
 
 DECLARED = """
-VAR a, b, c : FRAME ; n : SCALAR ;
+VAR a, b, c : FRAME ; n : SCALAR ; e : EVENT ;
 PROCEDURE away ; BEGIN MOVE ARM_1 TO a * XYZ(0, 0, -0.05) END ;
 BEGIN
   a = (1,0,0, 0,-1,0, 0,0,-1, 0.40, 0.15,0.20) ;
@@ -39,7 +39,14 @@ PROGRAMS = {
     "OPEN to a width": "OPEN ARM_1 TO 0.04 ;",
     "OPERATE": "OPERATE LAMP ON ; OPERATE LAMP OFF ;",
     "OPERATE of a device without an output": "OPERATE HORN ON ;",
+    "OPERATE to a number": "OPERATE DIMMER TO 0.5 ;",
+    "PULSE": "PULSE LAMP FOR 0.5 ; PAUSE 1 ;",
+    "a device that is on at the end": "OPERATE LAMP ON ;",
     "PAUSE": "PAUSE 0.5 ;",
+    "WAIT for an event": "WAIT e WITHIN 0.5 ELSE n = 1 ;",
+    "WAIT UNTIL": "WAIT UNTIL NOT INPUT(door) WITHIN 1 ;",
+    "IF of an INPUT": "IF INPUT(door) THEN HALT ; away() ;",
+    "LOG": 'LOG "n" (2) ; away() ;',
     "PRINT": 'PRINT ("n", 2) ;',
     "IF, WHILE, FOR, procedures": "n = 2 ; IF n > 1 THEN away() ; WHILE n < 4 DO n = 4 ; FOR n = 1 TO 2 DO away() ;",
     "AFFIX, UNFIX, frames": "AFFIX c TO b ; b = b * XYZ(0, 0, 0.02) ; MOVE ARM_1 TO c STRAIGHTLY ; UNFIX c FROM b ;",
@@ -81,7 +88,8 @@ base = [1, 0, 0,  0, 1, 0,  0, 0, 1,   0.00, 3.00, 0.00]
 hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0.40, 3.00, 0.25]
 encoders = {{ counts = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6] }}
 """
-    text = text.replace("[devices]", second + "\n[devices]\nHORN = {}")
+    dimmer = '\nHORN = {}\nDIMMER = { analogue = true, output = 5, signal = "aoDimmer" }'
+    text = text.replace("[devices]", f"{second}\n[devices]{dimmer}") + "\n[inputs]\nDOOR = {}\n"
     return text.replace("[visions]", "[visions]\nC = [[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.42,-0.10, 0.20]]")
 
 
@@ -123,12 +131,22 @@ def test_cells_of_the_table(target: str, construct: str, recorded: Callable[[str
     assert said.strip("`") in texts
 
 
-@pytest.mark.parametrize("construct", ["READ VISIONS", "TRY, RECOVER"])
+@pytest.mark.parametrize("construct", ["READ VISIONS", "TRY, RECOVER", "IF of an INPUT", "LOG"])
 def test_what_is_fixed_is_said(construct: str, recorded: Callable[[str, str], Recording]) -> None:
-    """Answers of a camera and errors of the run are named in the proof, with their lines."""
+    """Answers of a camera, values of inputs, rows and errors of the run are named in the proof, with their lines."""
     notes = export_run("ros2", recorded("ros2", construct), "construct").proof.notes
 
     assert [note[:8] for note in notes] == ["line 9: "]
+
+
+def test_waits_for_an_event_keep_their_time(recorded: Callable[[str, str], Recording]) -> None:
+    """A program that waits for an event in vain waits on the controller too, as long as in the run."""
+    recording = recorded("urscript", "WAIT for an event")
+    (waited,) = (effect for effect in recording.effects if effect.kind == "WAIT")
+    text = export_run("urscript", recording, "construct").files["construct.script"]
+
+    assert waited.t1 - waited.t0 == pytest.approx(0.5)
+    assert text.count("  sleep(0.5000)\n") == 1
 
 
 def test_detours_are_knots() -> None:

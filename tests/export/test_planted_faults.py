@@ -322,5 +322,6 @@ def test_events_beside_trajectories() -> None:
     assert [{key: event[key] for key in event if key != "time"} for event in events] == [
         {"line": 8, "device": "LAMP", "on": True},
         {"line": 11, "text": "at c"},
+        {"line": 13, "device": "LAMP", "on": False},
     ]
     assert events[0]["time"] == recording.stages[1].t0

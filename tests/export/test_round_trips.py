@@ -91,13 +91,22 @@ def test_blends_become_zones(target: str) -> None:
     assert export(target, recording)["statements that differ in kind, text or order"] == 0
 
 
+def test_lines_without_a_turn_are_not_held_up() -> None:
+    """A line whose ends differ in orientation by rounding alone is not slowed by the speed of the rotation in KRL."""
+    text = export_run("krl", recorded("BEGIN MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.05) STRAIGHTLY END.", "krl"), "x").files
+    turns = [float(line.partition("=")[2]) for line in text["x.src"].splitlines() if line.startswith("$VEL.ORI")]
+
+    assert turns == [0.1, 0.1]
+
+
 @pytest.mark.parametrize("target", LANGUAGES)
 def test_rests_and_nothing(target: str) -> None:
-    """A MOVE to where the arm is takes the time it is given, and none without that."""
+    """A MOVE to where the arm is takes the time it is given, and none without that; the end switches devices off."""
     statements = plan_statements(recorded(BLENDED, target), "x").statements
 
-    assert [type(one).__name__ for one in statements[3:]] == ["SetOutput", "Say", "Wait"]
-    assert statements[-1].seconds == pytest.approx(0.5)
+    assert [type(one).__name__ for one in statements[3:]] == ["SetOutput", "Say", "Wait", "SetOutput"]
+    assert statements[-2].seconds == pytest.approx(0.5)
+    assert (statements[3].on, statements[-1].on) == (True, False)
 
 
 @pytest.mark.share(0.002)

@@ -65,6 +65,8 @@ def test_hostile_names_and_texts(target: str, sample: Any) -> None:
         ("2 parts", "p_2_parts"),
         ("", "p"),
         ("END", "END_2"),
+        ("sin", "sin_2"),
+        ("Con", "Con_2"),
         ("a-b c", "a_b_c"),
         ("ä", "p"),
         ("x" * 40, "x" * 24),

@@ -2,6 +2,7 @@
 
 import json
 import re
+import sqlite3
 import struct
 from pathlib import Path
 
@@ -207,6 +208,21 @@ def test_no_joint_states(tmp_path: Path) -> None:
     assert "no joint states; topics of the log: /image (sensor_msgs/msg/Image)" in refused(path, TooFewError)
 
 
+def test_names_in_one_line(tmp_path: Path) -> None:
+    """Names of topics and types with line ends and escape codes are told in one line."""
+    odd = ("/a\n\x1b[31m", "x\ny", "cdr", "ros2msg", b"")
+    path = mcap_file(tmp_path / "a.mcap", [odd], [(0, 0, b"x")])
+    assert r"topics of the log: /a\n\x1b[31m (x\ny)" in refused(path, TooFewError)
+
+    path = mcap_file(tmp_path / "b.mcap", [(odd[0], "foxglove.JointStates", "json", "", b"")], [(0, 0, b"x")])
+    assert r"b.mcap: /a\n\x1b[31m: a message" in refused(path)
+    base = sqlite3.connect(database(tmp_path / "c.db3", T, Q))
+    base.execute("UPDATE topics SET name = ?", (odd[0],))
+    base.commit()
+    base.close()
+    assert list(read_joint_log(tmp_path / "c.db3").topics) == [r"/a\n\x1b[31m"]
+
+
 @pytest.mark.parametrize("part", [0.1, 0.5, 0.9, 0.999])
 def test_ends_early(part: float, tmp_path: Path) -> None:
     """A file that was cut anywhere is refused, and what mends it is named where it may help."""
@@ -235,7 +251,7 @@ def test_ends_early(part: float, tmp_path: Path) -> None:
         (chunk(b"abcdefghijklmnop", "lz4", 3), "a chunk cannot be unpacked"),
         (chunk(b"abc", "rar", 3), "a chunk is compressed by 'rar'; expected zstd, lz4, or not at all"),
         (chunk(b"abc", "", 4), "a chunk is said to unpack to 4 bytes, and does not"),
-        (chunk(b"abc", "", 2**62), "too large: 4,611,686,018,427; the limit is 256 MB"),
+        (chunk(b"abc", "", 2**62), "too large: 4,611,686,018,427 MB; the limit is 256 MB"),
     ],
 )
 def test_damaged_records(body: bytes, message: str, tmp_path: Path) -> None:
@@ -254,9 +270,9 @@ def test_bombs(tmp_path: Path) -> None:
     assert "is said to unpack to 1000 bytes" in refused(path)
     path.write_bytes(MAGIC + 40 * chunk(bomb, "zstd", 50_000_000))
     with raised(log_unpacked_mb=60):
-        assert "100; the limit is 60 MB (`armwright --raise log_unpacked_mb=NUMBER ...` raises it)" in refused(path)
+        assert "100 MB; the limit is 60 MB (`armwright --raise log_unpacked_mb=NUMBER ...` raises it)" in refused(path)
     with raised(log_record_mb=10):
-        assert "50; the limit is 10 MB (`armwright --raise log_record_mb=NUMBER ...` raises it)" in refused(path)
+        assert "50 MB; the limit is 10 MB (`armwright --raise log_record_mb=NUMBER ...` raises it)" in refused(path)
 
 
 def test_sizes(tmp_path: Path) -> None:
@@ -271,7 +287,7 @@ def test_sizes(tmp_path: Path) -> None:
     with path.open("ab") as file:
         file.truncate(2_000_000)
     with raised(log_mb=1):
-        assert "too large: 2; the limit is 1 MB" in refused(path)
+        assert "too large: 2 MB; the limit is 1 MB" in refused(path)
 
 
 def test_many_joints_with_few_numbers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,7 +59,7 @@ def test_keywords_in_any_case() -> None:
     ]
 
 
-@pytest.mark.parametrize("text", ["0", "12", "0.5", "12.50", "1e5", "1E+5", "2.5e-3"])
+@pytest.mark.parametrize("text", ["0", "12", "0.5", "12.50", "1e5", "1E+5", "2.5e-3", "1e100"])
 def test_numbers(text: str) -> None:
     """Decimal numbers may have a fraction and an exponent."""
     (token,) = tokens_of(text)
@@ -69,7 +69,7 @@ def test_numbers(text: str) -> None:
     assert codes_of(text) == []
 
 
-@pytest.mark.parametrize("text", [".5", "5.", "1e", "1.2.3", "12abc", "1_000", "1e999"])
+@pytest.mark.parametrize("text", [".5", "5.", "1e", "1.2.3", "12abc", "1_000", "1e999", "1e101"])
 def test_malformed_numbers(text: str) -> None:
     """What only looks like a number is one token, reported once."""
     (token,) = tokens_of(text)
@@ -79,7 +79,7 @@ def test_malformed_numbers(text: str) -> None:
 
 
 @pytest.mark.parametrize("standard", Standard)
-@pytest.mark.parametrize(("text", "digits"), [("120mm", "120"), ("2.5E3Cm", "2.5E3"), ("1e5m", "1e5"), ("3s", "3")])
+@pytest.mark.parametrize(("text", "digits"), [("120mm", "120"), ("2.5E3Cm", "2.5E3"), ("1e97m", "1e97"), ("3s", "3")])
 def test_unit_is_part_of_its_number(text: str, digits: str, standard: Standard) -> None:
     """A unit that touches its number is part of the token, also for RLO-83, which has none to allow it."""
     (token,) = tokens_of(text, standard)
@@ -88,7 +88,7 @@ def test_unit_is_part_of_its_number(text: str, digits: str, standard: Standard) 
     assert codes_of(text, standard) == []
 
 
-@pytest.mark.parametrize("text", ["5mmm", "5metres", "1.5.2mm", "1e999mm", ".5mm"])
+@pytest.mark.parametrize("text", ["5mmm", "5metres", "1.5.2mm", "1e999mm", "1e98m", ".5mm"])
 def test_malformed_units(text: str) -> None:
     """What only looks like a number with a unit is one token, reported once."""
     (token,) = tokens_of(text)

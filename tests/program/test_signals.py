@@ -8,7 +8,7 @@ import pytest
 
 from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
-from armwright.cell.signals import Input, Wiring
+from armwright.cell.signals import Input, Signals, Wiring
 from armwright.cell.simulator import Simulator
 from armwright.program import Source, compile as translate, run as run_program
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
@@ -63,6 +63,32 @@ def test_input_from_an_event() -> None:
     PAUSE 0.1 ; PRINT(INPUT(asked), INPUT(begun)) ;"""
 
     assert lines(text) == ["false false", "true true", "false true"]
+
+
+def test_a_second_signal_keeps_an_input_on() -> None:
+    """An input that an event switches on for a time is on for that time after each SIGNAL, the last one included."""
+    text = """SIGNAL ready ; PAUSE 0.08 ; SIGNAL ready ; PAUSE 0.04 ; PRINT(INPUT(asked)) ;
+    PAUSE 0.05 ; PRINT(INPUT(asked)) ; PAUSE 0.02 ; PRINT(INPUT(asked)) ;"""
+
+    assert lines(text) == ["true", "true", "false"]
+
+
+def test_what_came_last_counts(sample: Sample) -> None:
+    """An input is what came last of its timeline and the output that it follows, looked up among all changes."""
+    for rng in sample.cases(100):
+        times = np.cumsum(rng.uniform(0.01, 0.2, 20)).tolist()
+        timeline = tuple((time, float(value)) for value, time in enumerate(times))
+        source = Input(analogue=True, start=-1.0, timeline=timeline, follows="PRESS", delay=0.3)
+        signals, changes = Signals({"LEVEL": source}), [*timeline]
+        for now in np.sort(rng.uniform(0.0, 2.5, 100)).tolist():
+            signals.now = now
+            if rng.uniform() < 0.2:
+                value = float(rng.integers(100, 200))
+                signals.write("PRESS", value)
+                changes.append((now + source.delay, value))
+            past = sorted(change for change in changes if change[0] <= now)
+
+            assert signals.input("LEVEL") == (past[-1][1] if past else -1.0)
 
 
 def test_outputs() -> None:

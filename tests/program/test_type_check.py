@@ -202,3 +202,26 @@ def test_many_undeclared_names() -> None:
 
     assert sum(one.code == "E202" for one in found) == 3000
     assert sum("did you mean" in "".join(one.helps) for one in found) < 20
+
+
+@pytest.mark.parametrize(
+    ("call", "message", "help_"),
+    [
+        ("n = half", "`half` is a FUNCTION and no variable", "has parentheses: `half(...)`"),
+        ("n = one", "`one` is a FUNCTION and no variable", "has parentheses: `one()`"),
+        ("n = swap", "`swap` is a procedure and no variable", "a statement of its own: `swap(...)`"),
+        ("swap(n, n)", "`n` is passed twice to `swap`, which may change it", "a copy of it"),
+        ("swap(a[n], a[n + 1])", "`a[n + 1]` may be passed twice to `swap`, which may change it", "a copy of it"),
+    ],
+)
+def test_functions_and_procedures(call: str, message: str, help_: str) -> None:
+    """A function without its parentheses is told from a procedure, and an alias from what may be one."""
+    text = f"""VAR n : SCALAR ; a : ARRAY [3] OF SCALAR ;
+    FUNCTION half (n : SCALAR) : SCALAR ; BEGIN RETURN n / 2 END ;
+    FUNCTION one : SCALAR ; BEGIN RETURN 1 END ;
+    PROCEDURE swap (INOUT x, y : SCALAR) ; VAR z : SCALAR ; BEGIN z = x ; x = y ; y = z END ;
+    BEGIN n = 1 ; {call} END."""
+    found = [one for one in checked(text)[1] if one.is_error]
+
+    assert [one.message for one in found] == [message]
+    assert help_ in " ".join(found[0].helps)

@@ -1,6 +1,9 @@
 """Inputs and outputs of a cell: what a program switches, and what it reads at a time."""
 
+import math
+from bisect import bisect_right
 from collections.abc import Mapping
+from operator import itemgetter
 from typing import TypeAlias
 
 import attrs
@@ -48,9 +51,10 @@ class Wiring:
     analogue_devices: frozenset[str] = frozenset()
 
 
-def value_at(changes: Changes, time: float, start: float = 0.0) -> float:
-    """Return the value behind the last change up to a time [s]; the one at the start where there is none."""
-    return next((value for when, value in reversed(changes) if when <= time + _SAME_TIME), start)
+def latest_change(changes: Changes, time: float) -> tuple[float, float] | None:
+    """Return the last change up to a time [s]; None where there is none."""
+    index = bisect_right(changes, time + _SAME_TIME, key=itemgetter(0))
+    return changes[index - 1] if index else None
 
 
 class Signals:
@@ -61,7 +65,7 @@ class Signals:
         self._inputs, self.now = inputs, 0.0
         self._outputs: dict[str, Changes] = {}
         # When events were signalled, and what switches were set to by hand.
-        self._events: dict[str, tuple[float, ...]] = {}
+        self._events: dict[str, Changes] = {}
         self._switches: dict[str, Changes] = {}
 
     def copy(self) -> "Signals":
@@ -85,7 +89,8 @@ class Signals:
 
     def output(self, name: str) -> float:
         """Return what an output is now."""
-        return value_at(self._outputs.get(name, ()), self.now)
+        change = latest_change(self._outputs.get(name, ()), self.now)
+        return 0.0 if change is None else change[1]
 
     def active(self) -> frozenset[str]:
         """Return the outputs that are on."""
@@ -95,7 +100,7 @@ class Signals:
 
     def note_event(self, event: str) -> None:
         """Take note that the program has signalled an event now."""
-        self._events[event] = (*self._events.get(event, ()), self.now)
+        self._events[event] = (*self._events.get(event, ()), (self.now, 1.0))
 
     def set_input(self, name: str, value: float) -> None:
         """Set an input by hand: from now on it is that, until its timeline, output or event changes it."""
@@ -105,13 +110,15 @@ class Signals:
     def input(self, name: str) -> float:
         """Return what an input is now: what came last of its timeline, its output, its event and its switch."""
         source, now = self._inputs[name], self.now
-        changes = [*source.timeline]
-        if source.follows is not None:
-            changes += [(when + source.delay, value) for when, value in self._outputs.get(source.follows, ())]
-        for when in self._events.get(source.event or "", ()):
-            changes.append((when, 1.0))
-            if source.pulse is not None:
-                changes.append((when + source.pulse, 0.0))
-        changes += self._switches.get(name, ())
+        changes = [latest_change(source.timeline, now)]
+        if source.follows is not None and (
+            repeated := latest_change(self._outputs.get(source.follows, ()), now - source.delay)
+        ):
+            changes.append((repeated[0] + source.delay, repeated[1]))
+        if source.event is not None and (signalled := latest_change(self._events.get(source.event, ()), now)):
+            over = math.inf if source.pulse is None else signalled[0] + source.pulse
+            changes.append((over, 0.0) if over <= now + _SAME_TIME else signalled)
+        changes.append(latest_change(self._switches.get(name, ()), now))
         # Of changes at one time the last in this list counts.
-        return value_at(tuple(sorted(changes, key=lambda change: change[0])), now, source.start)
+        found = [change for change in reversed(changes) if change is not None]
+        return max(found, key=itemgetter(0))[1] if found else source.start

@@ -1,5 +1,6 @@
 """The kinematic simulator: a cell that behaves as its file states."""
 
+import math
 from collections.abc import Sequence
 from itertools import compress
 
@@ -360,9 +361,11 @@ class Simulator:
         """Set an input by hand, from now on.
 
         Raises:
-            DeviceError: there is no such input, or a digital one would be neither 0 nor 1.
+            DeviceError: there is no such input, a digital one would be neither 0 nor 1, or the number is not finite.
         """
         self._require_input(name)
+        if not math.isfinite(value):
+            raise DeviceError(f"input {name} of cell '{self._cell.name}': expected a finite number, got {value:g}")
         if not self._cell.wiring.inputs[name].analogue and value not in (0.0, 1.0):
             raise DeviceError(f"input {name} of cell '{self._cell.name}' is digital: expected 0 or 1, got {value:g}")
         self._signals.set_input(name, value)

@@ -1,6 +1,7 @@
 """The debugger on a terminal: reads commands line by line and prints their results."""
 
 import cmd
+import re
 import sys
 import threading
 from functools import partialmethod
@@ -23,9 +24,10 @@ g         next stage of a MOVE                    c         on to the next break
 t [N]     on by N servo ticks                     b LINE [if CONDITION]   stop at a line
 d FRAME   stop when it moves or changes           x N       delete breakpoint N
 p EXPR    print a value                           set NAME = EXPR         assign a value
-frames    the frame tree                          vars      all variables
-where     where all processes are                 list      the program around here
-th N      select process N                        q         quit
+frames    the frame tree                          set INPUT(NAME) = 1     switch an input by hand
+where     where all processes are                 vars      all variables
+th N      select process N                        list      the program around here
+q         quit
 Full words are accepted too: next, step, out, stage, continue, break, print, quit.
 An empty line repeats the last step. Ctrl-C stops a program that runs."""
 # Commands that an empty line repeats.
@@ -37,6 +39,9 @@ _LIST_CONTEXT = 5
 _SLICE = 0.05
 # Digits of a count, or of the number of a breakpoint or process, at most.
 _MAX_DIGITS = 15
+# What of the cell can be set by hand, and what may stand for 0 and 1.
+_INPUT = re.compile(r"(?:INPUT|ANALOG)\s*\(\s*(\w+)\s*\)", re.IGNORECASE)
+_STATES = {"TRUE": 1.0, "FALSE": 0.0, "ON": 1.0, "OFF": 0.0}
 _EVENT_LOG_HINT = "`armwright run -o FOLDER` writes all to events.jsonl"
 
 
@@ -195,8 +200,12 @@ class Terminal(cmd.Cmd):
         self.do_p("frames")
 
     def do_set(self, argument: str) -> None:
-        """Assign a value."""
+        """Assign a value, or switch an input by hand."""
         name, _, text = argument.partition("=")
+        if (found := _INPUT.fullmatch(name.strip())) is not None:
+            self._debugger.set_input(found[1], _parse_state(text.strip()))
+            print(self._debugger.evaluate(name.strip(), self._path).value)
+            return
         variable = self._debugger.evaluate(name.strip(), self._path).slot
         if variable is None:
             print(f"cannot assign to `{name.strip()}`")
@@ -235,6 +244,14 @@ class Terminal(cmd.Cmd):
             return
         self._path = processes[index - 1].path
         self.do_where("")
+
+
+def _parse_state(text: str) -> float:
+    """Return the value of an input."""
+    try:
+        return _STATES[text.upper()] if text.upper() in _STATES else float(text)
+    except ValueError:
+        raise InvalidValueError(f"expected TRUE, FALSE or a number, got `{shortened(text)}`") from None
 
 
 def _parse_number(text: str) -> int:

@@ -1,6 +1,7 @@
 """What of a run no trajectory carries: outputs that are switched, and texts, with their times."""
 
 import json
+from collections.abc import Iterator
 
 from armwright.program.vm.recording import Effect, Recording
 
@@ -10,21 +11,25 @@ _SWITCHED = {"OPEN": False, "GRASP": True}
 def events_file(recording: Recording) -> str:
     """Return the text of ``events.json``: what is switched and shown, when, and in which line of the program."""
     source = recording.code.source
-    rows = []
-    for effect in recording.effects:
-        data = _event(effect)
-        if data:
-            rows.append({"time": effect.t0, "line": source.line(effect.span.start), **data})
+    rows = [
+        {"time": effect.t0, "line": source.line(effect.span.start), **data}
+        for effect in recording.effects
+        for data in _events(effect)
+    ]
     body = ",\n".join(json.dumps(row) for row in rows)
     return f"[\n{body}\n]\n" if rows else "[]\n"
 
 
-def _event(effect: Effect) -> dict[str, object] | None:
-    """Return what is switched or shown, as plain data."""
+def _events(effect: Effect) -> Iterator[dict[str, object]]:
+    """Give what is switched or shown, as plain data."""
     words = effect.text.split()
     if effect.kind in _SWITCHED:
         width = {"width": float(words[-1])} if "TO" in words else {}
-        return {"gripper": effect.arm, "closed": _SWITCHED[effect.kind], **width}
-    if effect.kind == "OPERATE":
-        return {"device": words[0].upper(), "on": words[1] == "ON"}
-    return {"text": effect.data["printed"]} if effect.kind == "PRINT" else None
+        yield {"gripper": effect.arm, "closed": _SWITCHED[effect.kind], **width}
+    elif effect.kind == "OPERATE":
+        # The number that a device is set to, or the length of a pulse, is in the data.
+        yield {"device": words[0].upper(), **(effect.data or {"on": words[1] == "ON"})}
+    elif effect.kind == "PRINT":
+        yield {"text": effect.data["printed"]}
+    elif effect.kind == "END":
+        yield from ({"device": device, "on": False} for device in effect.data["switched_off"])

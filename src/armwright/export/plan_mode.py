@@ -36,7 +36,9 @@ _LOOKS = 65
 _PART_OF_LEG = 0.4
 _SWITCHING = ("OPEN", "GRASP", "OPERATE")
 # What takes no part in an export: it changes frames, or orders the branches of a program.
-_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "END")
+_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT")
+# What reads the cell while the program runs.
+_READING = (Op.INPUT, Op.ANALOG, Op.FORCE)
 
 _Event: TypeAlias = tuple[float, float, Effect, tuple[RunStage, ...]]
 
@@ -61,7 +63,12 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
     mapped = _mapped(recording, arm_name)
     solver = solver_of(planning_arm(placed.arm))
     statements: list[Statement] = []
-    for _, _, effect, stages in _events(recording):
+    busy = 0.0
+    for begin, end, effect, stages in _events(recording):
+        if begin > busy + 1.5 * recording.cell.period:
+            # An event has been waited for.
+            statements.append(Wait(span=effect.span, seconds=begin - busy))
+        busy = max(busy, end)
         if effect.kind == "MOVE":
             statements += [
                 statement for stage in stages for statement in _motion(stage, recording, solver, zones=zones)
@@ -72,6 +79,11 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
             statements.append(Wait(span=effect.span, seconds=effect.t1 - effect.t0))
         elif effect.kind == "PRINT":
             statements.append(Say(span=effect.span, text=str(effect.data["printed"])))
+        elif effect.kind == "END":
+            statements += [
+                _set_device(device, on=False, effect=effect, recording=recording)
+                for device in effect.data["switched_off"]
+            ]
     return ControllerProgram(
         name=name,
         source=recording.code.source,
@@ -88,12 +100,20 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
 def fixed_notes(recording: Recording) -> Iterator[str]:
     """Give what of a run is fixed in its export, each with the line of the program."""
     source, told = recording.code.source, set[str]()
+    for step in recording.code.instructions:
+        if step.op in _READING:
+            note = f"line {source.line(step.span.start)}: what inputs and sensors say is that of the run"
+            if note not in told:
+                told.add(note)
+                yield note
     for effect in recording.effects:
         line = source.line(effect.span.start)
         if effect.kind == "READ" and effect.arm is None:
             note = f"line {line}: the answer of the camera is that of the run"
         elif effect.kind == "ERROR":
             note = f"line {line}: the error of the run, and what the program did then, are part of the export"
+        elif effect.kind == "LOG":
+            note = f"line {line}: the rows of LOG are those of the run, and the controller writes none"
         else:
             continue
         if note not in told:
@@ -102,7 +122,7 @@ def fixed_notes(recording: Recording) -> Iterator[str]:
 
 
 def refuse_guards(recording: Recording) -> None:
-    """Refuse a run with a MOVE that is guarded, or that was stopped on its path.
+    """Refuse a run with a MOVE that is guarded or was stopped on its path, or that waits for a condition.
 
     Raises:
         ExportError: it has one.
@@ -121,6 +141,10 @@ def refuse_guards(recording: Recording) -> None:
         if effect.kind == "ZERO":
             text = "ZERO FORCE sets a force sensor, which a planned motion does not read"
             raise refusal(source, "E611", text, effect.span, "no controller is told so", helps=["leave it out"])
+        if effect.kind == "WAIT" and "event" not in effect.data:
+            text = "a WAIT UNTIL ends when its condition holds, and a planned motion goes on at the same time always"
+            helps = ["write PAUSE, or export the parts of the program before and behind it"]
+            raise refusal(source, "E611", text, effect.span, "a condition is waited for", helps=helps)
 
 
 def _only_arm(recording: Recording) -> str:
@@ -194,29 +218,43 @@ def _belongs(stage: RunStage, effect: Effect) -> bool:
 
 def _switching(effect: Effect, recording: Recording) -> list[Statement]:
     """Return the statements of an OPEN, a GRASP or an OPERATE."""
-    source, cell = recording.code.source, recording.cell
+    source = recording.code.source
     words = effect.text.split()
     if effect.kind == "OPERATE":
         device, on = words[0].upper(), words[1] == "ON"
-        output, where = (cell.devices or {}).get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
+        if effect.data:
+            text = f"an output switches {device} on or off, and cannot {_beyond_switching(effect)}"
+            helps = [f"write `OPERATE {device} ON` and `OPERATE {device} OFF`"]
+            raise refusal(source, "E616", text, effect.span, "more than a switch is asked for", helps=helps)
     else:
         device, on = str(effect.arm), effect.kind == "GRASP"
+        if "TO" in words:
+            text = f"an output switches the gripper of {device}, and cannot open it to a width"
+            raise refusal(source, "E616", text, effect.span, "a width is asked for", helps=[f"write `OPEN {device}`"])
+    waiting = [Wait(span=effect.span, seconds=effect.t1 - effect.t0)] if effect.t1 > effect.t0 else []
+    return [_set_device(device, on=on, effect=effect, recording=recording), *waiting]
+
+
+def _beyond_switching(effect: Effect) -> str:
+    """Return what an OPERATE or a PULSE does that a switch cannot."""
+    return "end a PULSE while the program goes on" if "seconds" in effect.data else "set it to a number"
+
+
+def _set_device(device: str, *, on: bool, effect: Effect, recording: Recording) -> SetOutput:
+    """Return the statement that switches a device, or the gripper of an arm."""
+    cell = recording.cell
+    if device in cell.arms:
         output, where = (
             cell.arms[device].controller.gripper_output,
             f"`[arms.{device}]` `gripper_output = {{ output = 1 }}`",
         )
-        if "TO" in words:
-            text = f"an output switches the gripper of {device}, and cannot open it to a width"
-            raise refusal(source, "E616", text, effect.span, "a width is asked for", helps=[f"write `OPEN {device}`"])
+    else:
+        output, where = (cell.devices or {}).get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
     if output is None:
-        text = f"the cell file does not say which output of the controller switches {_subject(device, effect)}"
-        raise refusal(source, "E615", text, effect.span, "it is switched here", helps=[f"write {where}"])
-    waiting = [Wait(span=effect.span, seconds=effect.t1 - effect.t0)] if effect.t1 > effect.t0 else []
-    return [SetOutput(span=effect.span, device=device, output=output, on=on), *waiting]
-
-
-def _subject(device: str, effect: Effect) -> str:
-    return device if effect.kind == "OPERATE" else f"the gripper of {device}"
+        subject = f"the gripper of {device}" if device in cell.arms else device
+        text = f"the cell file does not say which output of the controller switches {subject}"
+        raise refusal(recording.code.source, "E615", text, effect.span, "it is switched here", helps=[f"write {where}"])
+    return SetOutput(span=effect.span, device=device, output=output, on=on)
 
 
 # ---- motions -------------------------------------------------------------------------------------------------------

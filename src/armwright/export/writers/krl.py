@@ -25,8 +25,9 @@ from armwright.export.writers.text import decimal, decimals, identifier, plain_l
 # Digits behind the point: 10 nm and 0.2 µrad.
 _DIGITS = 5
 _NAME_LIMIT = 24
-# The slowest that motions are written with: part of the axis speed [%], [m/s], [deg/s], [m/s²].
-_LEAST_PERCENT, _LEAST = 0.1, 1e-4
+# The slowest that motions are written with: part of the axis speed [%], [m/s] and [m/s²], [deg/s]. Of lines without a
+# turn the ends differ by rounding, which must not take longer than the line.
+_LEAST_PERCENT, _LEAST, _LEAST_TURN = 0.1, 1e-4, 0.1
 # How near knots are passed, as a part of the ways between them [%].
 _KNOT_ZONE = 50
 # How fast the arm comes to where the program begins, from wherever it is [%].
@@ -96,10 +97,8 @@ def _lines(
 def _straight(
     statement: MoveLines, program: ControllerProgram, said: dict[str, str], ends: Iterator[Posture]
 ) -> Iterator[str]:
-    speed, turn, acceleration = (
-        decimal(max(x, _LEAST), 5)
-        for x in (statement.speed, float(np.degrees(statement.turn_speed)), statement.acceleration)
-    )
+    speed, acceleration = (decimal(max(x, _LEAST), 5) for x in (statement.speed, statement.acceleration))
+    turn = decimal(max(float(np.degrees(statement.turn_speed)), _LEAST_TURN), 5)
     wanted = {"$VEL.CP=": speed, "$VEL.ORI1=": turn, "$VEL.ORI2=": turn, "$ACC.CP=": acceleration}
     yield from _settings(said, wanted)
     poses = program.mapped.pose(statement.poses)

@@ -267,7 +267,7 @@ def _messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[RawMess
     try:
         size = path.stat().st_size
         if size > limit("log_mb") * MEGABYTE:
-            message = f"too large: {limit_message('log_mb', f'{size / MEGABYTE:,.0f}')}"
+            message = f"too large: {limit_message('log_mb', f'{size / MEGABYTE:,.0f} MB')}"
             raise FileFormatError(path, None, "", message)
         with path.open("rb") as file:
             note_source(path)

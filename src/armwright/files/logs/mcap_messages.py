@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 from armwright.errors import FileFormatError
 from armwright.extras import import_extra
 from armwright.files.limits import MEGABYTE, limit, limit_message
-from armwright.files.logs.raw_message import Channel, RawMessage
+from armwright.files.logs.raw_message import Channel, RawMessage, printable
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 2, 3, 4, 5, 6, 15
@@ -122,7 +122,7 @@ class _Reader:
             read = self._read(self._records.Channel, body)
             schema = self._schemas.get(read.schema_id)
             name, data = ("", b"") if schema is None else (schema.name, schema.data)
-            channel = Channel(read.topic, name, read.message_encoding, data)
+            channel = Channel(printable(read.topic), printable(name), read.message_encoding, data)
             self._channels[read.id] = channel if self._wanted(channel) else None
 
     def _read(self, record: Any, body: bytes) -> Any:
@@ -154,7 +154,7 @@ class _Reader:
         return data
 
     def _refuse(self, name: str, size: int) -> None:
-        got = f"{size / MEGABYTE:,.0f}"
+        got = f"{size / MEGABYTE:,.0f} MB"
         raise FileFormatError(self._path, None, "", f"too large: {limit_message(name, got)}")
 
 

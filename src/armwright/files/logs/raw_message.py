@@ -7,7 +7,7 @@ class Channel(NamedTuple):
     """Where messages of one kind are.
 
     Attributes:
-        topic: its name.
+        topic: its name; characters that cannot be printed are escaped.
         kind: the type of its messages, such as ``sensor_msgs/msg/JointState``; empty where there is none.
         encoding: of its messages: ``cdr``, ``json``, ``protobuf``, ``ros1``.
         schema: the definition of the type; empty where there is none.
@@ -31,3 +31,8 @@ class RawMessage(NamedTuple):
     channel: Channel
     time: int
     data: bytes
+
+
+def printable(name: str) -> str:
+    """Return the name of a topic or a type in one line, for messages and tables: escaped where it cannot be printed."""
+    return name if name.isprintable() else name.encode("unicode_escape").decode("ascii")

@@ -13,13 +13,13 @@ from pathlib import Path
 
 from armwright.errors import FileFormatError
 from armwright.files.limits import MEGABYTE, limit
-from armwright.files.logs.raw_message import Channel, RawMessage
+from armwright.files.logs.raw_message import Channel, RawMessage, printable
 
 MAGIC = b"SQLite format 3\0"
 
 
 def sqlite_messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[RawMessage]:
-    """Give the messages of some topics of a database, in the order of time.
+    """Give the messages of some topics of a database, one topic after the other.
 
     It is opened for reading alone; what it defines beside its tables, such as views, is not looked at.
 
@@ -42,7 +42,7 @@ def sqlite_messages(path: Path, wanted: Callable[[Channel], bool]) -> Iterator[R
             for number, topic, kind, encoding in base.execute(
                 "SELECT id, name, type, serialization_format FROM topics"
             ):
-                channel = Channel(str(topic), str(kind), str(encoding))
+                channel = Channel(printable(str(topic)), printable(str(kind)), str(encoding))
                 if wanted(channel):
                     channels[number] = channel
             for number, channel in channels.items():

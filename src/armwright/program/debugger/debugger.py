@@ -24,8 +24,8 @@ from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Variable
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
+from armwright.program.language.units import MAX_NUMBER
 from armwright.program.vm.machine import Limits, Machine, RunError
-from armwright.program.vm.operators import MAX_NUMBER
 from armwright.program.vm.process import ElementReference, Process
 from armwright.program.vm.recording import Effect
 

@@ -24,6 +24,8 @@ UNITS: Mapping[str, tuple[Dimension, float]] = {
 LENGTHS = {"MM": "millimetres", "CM": "centimetres", "M": "metres", "IN": "inches"}
 # What a UNITS line may name: times are always seconds and forces newtons.
 DECLARABLE = tuple(unit for unit, (dimension, _) in UNITS.items() if dimension in ("length", "angle"))
+# Numbers beyond this are a slip, and squares of them would overflow.
+MAX_NUMBER = 1e100
 # Speeds of a MOVE, in per cent of the normal one.
 NORMAL_SPEED = 100.0
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0

@@ -40,7 +40,9 @@ class AliasChecker:
             is_inout = {first.parameter, second.parameter} & procedure.inout
             if is_inout and _may_be_same(first.name, second.name):
                 what = quote_expression(second.argument)
-                text = f"{what} is passed twice to `{node.name.text}`, which may change it"
+                certain = first.name == second.name and not first.name.endswith("[]")
+                twice = "is" if certain else "may be"
+                text = f"{what} {twice} passed twice to `{node.name.text}`, which may change it"
                 here = labels(first.argument.span, "passed here too")
                 advice = "pass a copy of it for the parameter that is only read"
                 self._names.report(

@@ -17,7 +17,7 @@ _MAX_TEXT = 1000
 _EXPECTED = {
     VariableKind.SCALAR: "a number, such as 80 or 25.4mm",
     VariableKind.BOOLEAN: "TRUE or FALSE",
-    VariableKind.TEXT: f"a text of at most {_MAX_TEXT} characters",
+    VariableKind.TEXT: f"one line of at most {_MAX_TEXT} characters",
 }
 
 
@@ -57,7 +57,8 @@ def _expression(name: str, value: str | float | bool, kind: VariableKind, span: 
     written = str(value)
     expression: tree.Expression | None = None
     if kind is VariableKind.TEXT and isinstance(value, str) and len(value) <= _MAX_TEXT:
-        expression = tree.String(span, value)
+        # As in a program, a text stands on one line.
+        expression = tree.String(span, value) if len(f"{value}.".splitlines()) == 1 else None
     elif kind is VariableKind.BOOLEAN and written.upper() in ("TRUE", "FALSE"):
         one = tree.Number(span, "1", 1.0)
         expression = tree.Binary(span, "=", one, tree.Number(span, "1", float(written.upper() == "TRUE")))

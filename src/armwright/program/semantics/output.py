@@ -1,5 +1,6 @@
 """PRINT and LOG."""
 
+from armwright.errors import counted
 from armwright.program.language.diagnostic import labels
 from armwright.program.language.names import LOG_NAME
 from armwright.program.semantics.context import Checks, Context
@@ -26,10 +27,11 @@ def log(context: Context, node: tree.Log) -> None:
         names.report("E235", text, name.span, "not a name", note=note, advice=advice)
     first = names.logs.setdefault(name.value.lower(), node)
     if len(first.items) != len(node.items):
-        text = f'log "{name.value}" has {len(first.items)} columns, not {len(node.items)}'
+        columns = counted(len(first.items), "column")
+        text = f'log "{name.value}" has {columns}, not {len(node.items)}'
         here = labels(first.span, "first written here")
         advice = "give the other rows a log of their own"
-        names.report("E235", text, node.span, f"{len(node.items)} values", secondary=here, advice=advice)
+        names.report("E235", text, node.span, counted(len(node.items), "value"), secondary=here, advice=advice)
     for item in node.items:
         actual = infer_type(names, item)
         if actual is ExpressionType.EVENT:

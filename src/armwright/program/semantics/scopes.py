@@ -164,10 +164,13 @@ class NameResolver:
 
     def _report_undeclared(self, name: tree.Name) -> None:
         note, advice = "", "declare it in the VAR part"
-        if name.key in self.symbols.procedures:
-            text = f"`{name.text}` is a procedure and no variable"
-            advice = f"a procedure is called by a statement of its own: `{name.text}(...)`"
-            self.report("E227", text, name.span, "a procedure", advice=advice)
+        if (procedure := self.symbols.procedures.get(name.key)) is not None:
+            kind = "FUNCTION" if procedure.is_function else "procedure"
+            call = f"{name.text}({'...' if procedure.parameters else ''})"
+            advice = f"a procedure is called by a statement of its own: `{call}`"
+            if procedure.is_function:
+                advice = f"the call of a FUNCTION has parentheses: `{call}`"
+            self.report("E227", f"`{name.text}` is a {kind} and no variable", name.span, f"a {kind}", advice=advice)
             return
         if not name.text.isascii():
             # The scanner has reported it.

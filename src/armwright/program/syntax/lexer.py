@@ -1,7 +1,6 @@
 """From characters to tokens. Spans count characters of the text as written; comments and blanks leave no token."""
 
 import enum
-import math
 import re
 from collections import Counter
 
@@ -11,7 +10,7 @@ from armwright.cell.names import arm_name
 from armwright.files.limits import limit, limit_message
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Fix
 from armwright.program.language.source import Source, Span
-from armwright.program.language.units import UNITS
+from armwright.program.language.units import MAX_NUMBER, UNITS
 from armwright.program.language.words import VOCABULARIES, Standard
 
 
@@ -254,9 +253,11 @@ class _Scanner:
     def _scan_number(self, word: str, start: int, end: int, *, malformed: bool) -> Token:
         match = _WITH_UNIT.fullmatch(word)
         digits = match[1] if match else word
-        if (match or not malformed) and math.isfinite(float(digits)):
+        # In another unit of length a number has up to a thousand times the digits.
+        largest = MAX_NUMBER * 1e-3 if match else MAX_NUMBER
+        if (match or not malformed) and float(digits) <= largest:
             return Token(TokenKind.NUMBER, word, digits, start, end)
-        why = "too large" if _is_number(digits) else "not a number"
+        why = f"too large: {largest:g} at most" if _is_number(digits) else "not a number"
         advice, fixes, span = "", tuple[Fix, ...](), Span(start, end)
         if _is_number(word) and "." in (word[0], word[-1]):
             cured = f"0{word}" if word[0] == "." else f"{word}0"

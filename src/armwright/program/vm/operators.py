@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.program.bytecode.instructions import Op
-from armwright.program.language.units import UnitSystem
+from armwright.program.language.units import MAX_NUMBER, UnitSystem
 from armwright.program.syntax.pose_literals import EXACT_TOLERANCE, REPAIR_TOLERANCE
 from armwright.spatial.euler import from_rpy, to_rpy
 from armwright.spatial.poses import from_noap, homogeneous, inverse
@@ -22,8 +22,6 @@ from armwright.spatial.rotations import (
     rotation_vector,
 )
 
-# Numbers beyond this are a slip, and squares of them would overflow.
-MAX_NUMBER = 1e100
 # Points nearer than this part of their distance from the origin, or of a metre, are the same point.
 _ROUNDING = 1e-12
 
