@@ -58,9 +58,7 @@ class Compilation:
         tokens: its words, without those of modules.
         comments: where its comments stand.
         tree: what it says.
-        whole: the same with all modules, in which every name stands for one thing.
-        spelling: how the names of the whole are written, by their keys.
-        symbols: its names.
+        symbols: the names of the whole.
         imports: what its IMPORTs brought.
         flow: the arms of its statements; None where the syntax is wrong, or where only names were requested.
         diagnostics: what is wrong or odd, in the order of the text.
@@ -69,6 +67,9 @@ class Compilation:
             it imports; None where there is none, or only its names are known.
         cell_symbols: what was known of the cell when the program was checked.
         strict: whether an AFFIX that is only implied is an error.
+        whole: what it says together with all modules, in which every name stands for one thing.
+        spelling: how the names of the whole are written, by their keys.
+        brought: the names that modules give, as this file may write them, with their keys in the whole.
     """
 
     source: Source
@@ -76,8 +77,6 @@ class Compilation:
     tokens: tuple[Token, ...]
     comments: tuple[Span, ...]
     tree: tree.Program
-    whole: tree.Program
-    spelling: Mapping[str, str]
     symbols: Symbols
     imports: tuple[ImportedFrames, ...]
     flow: Flow | None
@@ -86,6 +85,9 @@ class Compilation:
     cell: Cell | None = None
     cell_symbols: KnownCell | None = None
     strict: bool = False
+    whole: tree.Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
+    spelling: Mapping[str, str] = attrs.field(factory=dict)
+    brought: Mapping[str, str] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -124,7 +126,9 @@ class ProgramError(ArmwrightError, ValueError):
         errors = [diagnostic for diagnostic in compilation.diagnostics if diagnostic.is_error]
         first, source = errors[0], compilation.source
         more = f" (and {counted(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
-        super().__init__(f"{source.name_at(first.span.start)}:{source.line(first.span.start)}: {first.code}: {first.message}{more}")
+        super().__init__(
+            f"{source.name_at(first.span.start)}:{source.line(first.span.start)}: {first.code}: {first.message}{more}"
+        )
 
 
 def compile(  # noqa: A001 - what a translator does
@@ -402,6 +406,7 @@ def _check_names(
         comments=main.scanned.comments,
         tree=main.tree,
         whole=linked.tree,
+        brought=linked.brought,
         spelling=_name_spellings((main,) if files is None else files.files.values(), linked),
         symbols=symbols,
         imports=imports,

@@ -142,9 +142,13 @@ class Source:
         Raises:
             IndexError: the file has no such line.
         """
-        starts, index = self.line_starts, self._first_lines[file] + line - 1
-        end = starts[index + 1] if index + 1 < self._line_counts[file] else self._file_end(file)
-        return self.text[starts[index] : end].rstrip("\r\n")
+        index = self._first_lines[file] + line
+        end = self.line_starts[index] if index < self._line_counts[file] else self._file_end(file)
+        return self.text[self.line_start(line, file) : end].rstrip("\r\n")
+
+    def line_start(self, line: int, file: int = 0) -> int:
+        """Return where a line of a file starts; the arguments are those of ``line_text``."""
+        return self.line_starts[self._first_lines[file] + line - 1]
 
     def line_at(self, offset: int) -> str:
         """Return the line that holds a character, without its end."""

@@ -1,6 +1,6 @@
 """Linking: one program of all files, in which every name stands for one thing."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import get_args
 
 import attrs
@@ -31,12 +31,14 @@ class LinkedProgram:
     Attributes:
         tree: the headers and statements of all files, those of modules first.
         exported: the names that modules give, by their keys in the tree.
+        brought: the names that modules give to the program's own file, as it may write them, and their keys.
         diagnostics: what is wrong with the modules and their names, errors of syntax in modules included.
     """
 
     tree: tree.Program
     exported: frozenset[str]
     diagnostics: list[Diagnostic]
+    brought: Mapping[str, str] = attrs.field(factory=dict)
 
 
 def link(program: ProgramFiles, cell_frames: Collection[str] = ()) -> LinkedProgram:
@@ -65,7 +67,8 @@ def link(program: ProgramFiles, cell_frames: Collection[str] = ()) -> LinkedProg
     modules = [path for path, file in program.files.items() if file.tree.module is not None]
     exported = frozenset(meaning.key for path in modules for meaning in names[path].own.values())
     whole = attrs.evolve(main.tree, headers=tuple(headers), statements=tuple(statements))
-    return LinkedProgram(tree=whole, exported=exported, diagnostics=diagnostics)
+    brought = names[main.path].brought()
+    return LinkedProgram(tree=whole, exported=exported, diagnostics=diagnostics, brought=brought)
 
 
 class _Linker:

@@ -48,6 +48,13 @@ class FileNames:
     modules: dict[str, Mapping[str, Meaning]] = attrs.field(factory=dict)
     hidden: dict[str, Meaning] = attrs.field(factory=dict)
 
+    def brought(self) -> dict[str, str]:
+        """Return the names that modules give, as the file may write them, with their keys in the whole program."""
+        keys = {key: meanings[0].key for key, meanings in self.visible.items() if len(meanings) == 1}
+        for module, names in self.modules.items():
+            keys |= {f"{module}.{key}": meaning.key for key, meaning in names.items()}
+        return keys
+
 
 def declared_names(program: tree.Program) -> dict[str, tree.Name]:
     """Return the names of the program's level that a file declares, by key."""
@@ -112,9 +119,7 @@ def _report_shared_frame(seen: Mapping[str, FileNames], name: tree.Name, diagnos
     diagnostics.report("E252", text, name.span, "declared here", secondary=here, advice=advice)
 
 
-def _import_names(
-    program: ProgramFiles, seen: Mapping[str, FileNames], path: str, diagnostics: DiagnosticList
-) -> None:
+def _import_names(program: ProgramFiles, seen: Mapping[str, FileNames], path: str, diagnostics: DiagnosticList) -> None:
     names = seen[path]
     for imported in program.imports[path]:
         node, module = imported.node, program.files[imported.path].tree.module

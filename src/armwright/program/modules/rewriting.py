@@ -1,14 +1,13 @@
 """Going through the statements of a file and putting other names, or other nodes, in the place of some."""
 
 from collections.abc import Callable
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import attrs
 
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 
-_N = TypeVar("_N", bound=tree.Node)
 # Gives what a name becomes; a Poison where it was reported.
 Rename: TypeAlias = Callable[[tree.Name], tree.Name | tree.Poison]
 
@@ -36,12 +35,9 @@ class Rewriter:
     procedure: Rename
     is_special: Callable[[tree.Function], bool]
 
-    def __call__(self, node: _N) -> _N | tree.Poison:
-        """Return a node with other names; the node itself where nothing changes."""
-        return self._rewritten(node)
-
-    def _rewritten(self, node: Any) -> Any:
-        if isinstance(node, _LEAVES):
+    def __call__(self, node: Any) -> Any:
+        """Return a node with other names, or a Poison; the node itself where nothing changes."""
+        if isinstance(node, _LEAVES) or (isinstance(node, tree.Function) and self.is_special(node)):
             return node
         match node:
             case tree.Name():
@@ -50,13 +46,8 @@ class Rewriter:
                 return self._chain(node)
             case tree.If():
                 return self._choices(node)
-            case tree.Index():
-                name = self.variable(node.name)
-                return name if isinstance(name, tree.Poison) else self._with_parts(node, {"name": name})
-            case tree.Function() if self.is_special(node):
-                return node
-            case tree.Function() | tree.Call():
-                name = self.procedure(node.name)
+            case tree.Index() | tree.Function() | tree.Call():
+                name = (self.variable if isinstance(node, tree.Index) else self.procedure)(node.name)
                 return name if isinstance(name, tree.Poison) else self._with_parts(node, {"name": name})
         return self._with_parts(node, {field: getattr(node, field) for field in _OTHER_NAMES.get(type(node), ())})
 
@@ -69,19 +60,19 @@ class Rewriter:
             if field in parts or isinstance(value, Span):
                 continue
             if isinstance(value, tuple):
-                items = tuple(self._rewritten(item) if isinstance(item, tree.Node) else item for item in value)
+                items = tuple(self(item) if isinstance(item, tree.Node) else item for item in value)
                 if any(new is not old for new, old in zip(items, value, strict=True)):
                     changed[field] = items
-            elif isinstance(value, tree.Node) and (new := self._rewritten(value)) is not value:
+            elif isinstance(value, tree.Node) and (new := self(value)) is not value:
                 changed[field] = new
         return attrs.evolve(node, **changed) if changed else node
 
     def _chain(self, node: tree.Binary) -> tree.Expression:
         """Rewrite a chain of operations, which may be long, from its first operand on."""
         first, operations = tree.operation_chain(node)
-        left = self._rewritten(first)
+        left = self(first)
         for operation in operations:
-            right = self._rewritten(operation.right)
+            right = self(operation.right)
             same = left is operation.left and right is operation.right
             left = operation if same else attrs.evolve(operation, left=left, right=right)
         result: tree.Expression = left
@@ -90,9 +81,9 @@ class Rewriter:
     def _choices(self, node: tree.If) -> tree.If:
         """Rewrite an IF with all that follow it with ELSE IF, which may be many."""
         choices, last = node.else_if_chain
-        otherwise = None if last is None else self._rewritten(last)
+        otherwise = None if last is None else self(last)
         for choice in reversed(choices):
-            condition, then = self._rewritten(choice.condition), self._rewritten(choice.then)
+            condition, then = self(choice.condition), self(choice.then)
             same = condition is choice.condition and then is choice.then and otherwise is choice.otherwise
             otherwise = choice if same else attrs.evolve(choice, condition=condition, then=then, otherwise=otherwise)
         assert isinstance(otherwise, tree.If)  # noqa: S101 - the chain has one or more
