@@ -40,6 +40,7 @@ from armwright.program.semantics.cell_symbols import (
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.tree import Program
 from armwright.program.vm.interpreter import Progress, interpret
 from armwright.program.vm.machine import Limits
 from armwright.program.vm.recording import Recording
@@ -85,7 +86,7 @@ class Compilation:
     cell: Cell | None = None
     cell_symbols: KnownCell | None = None
     strict: bool = False
-    whole: tree.Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
+    whole: Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
     spelling: Mapping[str, str] = attrs.field(factory=dict)
     brought: Mapping[str, str] = attrs.field(factory=dict)
 
@@ -126,9 +127,8 @@ class ProgramError(ArmwrightError, ValueError):
         errors = [diagnostic for diagnostic in compilation.diagnostics if diagnostic.is_error]
         first, source = errors[0], compilation.source
         more = f" (and {counted(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
-        super().__init__(
-            f"{source.name_at(first.span.start)}:{source.line(first.span.start)}: {first.code}: {first.message}{more}"
-        )
+        place = f"{source.name_at(first.span.start)}:{source.line(first.span.start)}"
+        super().__init__(f"{place}: {first.code}: {first.message}{more}")
 
 
 def compile(  # noqa: A001 - what a translator does

@@ -32,7 +32,6 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
 
-
 _QUALIFIER = re.compile(r"(?<![\w.])([A-Za-z]\w*)\.(?:[A-Za-z]\w*\.)*\Z")
 _LONGEST_QUALIFIER = 100
 

@@ -131,7 +131,8 @@ class _Reader:
         """Read a module, unless that was done before; return its path, or None where that was reported."""
         written = PurePosixPath(node.path.value)
         if written.is_absolute() or ".." in written.parts or "\\" in node.path.value:
-            return self._refuse(node, "a module lies in the folder of the file that imports it, or below that")
+            self._refuse(node, "a module lies in the folder of the file that imports it, or below that")
+            return None
         path = beside(importer, node.path.value)
         if path in self._open:
             ring = " -> ".join((*self._open[self._open.index(path) :], path))
@@ -143,11 +144,13 @@ class _Reader:
         if path in self.files:
             return path
         if self._read_import is None:
-            return self._refuse(node, "a text without a file has no folder where it could lie")
+            self._refuse(node, "a text without a file has no folder where it could lie")
+            return None
         try:
             brought = self._read_import(path)
         except ArmwrightError as error:
-            return self._refuse(node, str(error))
+            self._refuse(node, str(error))
+            return None
         assert isinstance(brought, ImportedModule)  # noqa: S101 - its path is that of a module
         self.source = self.source.with_module(path, brought.text)
         self.visit(parse_file(self.source, path))

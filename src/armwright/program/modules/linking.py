@@ -218,12 +218,8 @@ def _check_module_names(program: ProgramFiles, diagnostics: DiagnosticList) -> N
 
 
 def _check_imports(program: ProgramFiles, path: str, diagnostics: DiagnosticList) -> None:
-    """Report imports of what is no module, names for what is none, and modules that count in other units."""
+    """Report imports of what is no module, and modules that count in other units."""
     importer = program.files[path]
-    for node in importer.tree.imports:
-        if node.alias is not None and not is_module(node.path.value):
-            text = f"`{node.path.value}` is no module, and its frames have their own names"
-            diagnostics.report("E250", text, node.alias.span, "no name is needed", advice="leave AS and the name out")
     for imported in program.imports[path]:
         node, file = imported.node, program.files[imported.path]
         if file.tree.module is None:

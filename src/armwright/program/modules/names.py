@@ -59,7 +59,8 @@ class FileNames:
 def declared_names(program: tree.Program) -> dict[str, tree.Name]:
     """Return the names of the program's level that a file declares, by key."""
     variables = (name for declaration in program.declarations for name in declaration.names)
-    names = (*variables, *(node.name for node in (*program.constants, *program.procedures)))
+    constants = (constant.name for constant in program.constants)
+    names = (*variables, *constants, *(procedure.name for procedure in program.procedures))
     return {name.key: name for name in reversed(names) if name.key not in PREDECLARED}
 
 

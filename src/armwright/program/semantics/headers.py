@@ -185,6 +185,9 @@ def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadI
         text = f"`{path.value}` is a module, and only the file of a program can import it"
         names.report("E228", text, path.span, "not read", advice="write a program in a file of its own")
         return
+    if header.alias is not None:
+        text = f"`{path.value}` is no module, and its frames have their own names"
+        names.report("E250", text, header.alias.span, "no name is needed", advice="leave AS and the name out")
     if read_import is None:
         names.symbols.open_import = True
         note = "a name that is not declared may be one of them"
