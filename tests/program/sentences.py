@@ -11,6 +11,8 @@ from lark.grammar import NonTerminal, Rule, Symbol, Terminal
 IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "BOOLEAN": ("BOOLEAN", "boolean"),
     "TEXT": ("TEXT", "text"),
+    "MODULE": ("MODULE", "module"),
+    "AS": ("AS", "as"),
     "CONST": ("CONST", "const"),
     "FUNCTION": ("FUNCTION", "function"),
     "MODE": ("IN", "INOUT", "inout"),

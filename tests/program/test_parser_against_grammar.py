@@ -42,6 +42,8 @@ WORDS = {
         "force",
         "torque",
         "const",
+        "module",
+        "as",
         "text",
         "boolean",
         "return",
@@ -52,6 +54,7 @@ WORDS = {
         "raise",
         "jam",
     ),
+    "DOTTED": ("grip.take", "f.g.h"),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),
     "ARM": ("ARM_1", "arm-2"),
@@ -72,7 +75,7 @@ MUTANTS_OF_EACH = 12
 
 def reserved(token: Token) -> Token:
     """Keep the lexer, which takes words by where they stand, from taking a reserved one or an arm for a name."""
-    taken = token.upper() in RESERVED or NO_NAME.fullmatch(token)
+    taken = token.upper().partition(".")[0] in RESERVED or NO_NAME.fullmatch(token)
     return Token.new_borrow_pos("RESERVED", token.value, token) if taken else token
 
 
@@ -80,7 +83,8 @@ GRAMMAR = Lark(
     (CORPUS / "rlo.lark").read_text(encoding="utf-8"),
     parser="lalr",
     lexer="contextual",
-    lexer_callbacks={"NAME": reserved},
+    # Lark compares with the last of them only.
+    lexer_callbacks={"DOTTED": reserved, "NAME": reserved},
 )
 
 

@@ -8,20 +8,21 @@ from functools import partialmethod
 from typing import TYPE_CHECKING, Any, cast
 
 from armwright.cli.repl_lines import Script, handle_interrupt
-from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, shortened
+from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, one_of, shortened
 
 if TYPE_CHECKING:
     from armwright.program.api import LoadedProgram
     from armwright.program.debugger.debugger import Command
     from armwright.program.debugger.history import ProcessPath
     from armwright.program.debugger.stop_reason import Stop
+    from armwright.program.language.source import Span
 
 _HELP = """\
 n         next statement, over procedures         back      back to the previous statement
 s         next statement, into procedures         tback     back by one servo tick
 o         out of the procedure                    rc        back to the last breakpoint
 g         next stage of a MOVE                    c         on to the next breakpoint
-t [N]     on by N servo ticks                     b LINE [if CONDITION]   stop at a line
+t [N]     on by N servo ticks                     b [FILE:]LINE [if CONDITION]   stop there
 d FRAME   stop when it moves or changes           x N       delete breakpoint N
 p EXPR    print a value                           set NAME = EXPR         assign a value
 frames    the frame tree                          set INPUT(NAME) = 1     switch an input by hand
@@ -155,23 +156,35 @@ class Terminal(cmd.Cmd):
             print(f"{debugger.time:9.3f} s  the program has ended; `back` still undoes its statements")
             return
         frame = debugger.stack(self._path)[0]
-        line = source.line(frame.span.start)
-        print(f"{debugger.time:9.3f} s  {frame.title}, line {line}{': ' + reason if reason else ''}")
-        print(f"{line:>5}  {source.line_text(line)}")
+        place, line = source.place(frame.span.start), source.line(frame.span.start)
+        print(f"{debugger.time:9.3f} s  {frame.title}, line {place}{': ' + reason if reason else ''}")
+        print(f"{line:>5}  {source.line_at(frame.span.start)}")
 
     # ---- breakpoints -----------------------------------------------------------------------------------------------
 
     def do_b(self, argument: str) -> None:
-        """Stop at a line, perhaps only under a condition."""
-        line, _, condition = argument.partition(" if ")
-        breakpoint_ = self._debugger.add_breakpoint(_parse_number(line), condition=condition.strip())
+        """Stop at a line of the present file or of another, perhaps only under a condition."""
+        place, _, condition = argument.partition(" if ")
+        name, colon, line = place.rpartition(":")
+        file = self._file_number(name.strip()) if colon else self._source.file_number(self._present.start)
+        breakpoint_ = self._debugger.add_breakpoint(_parse_number(line), file=file, condition=condition.strip())
         if breakpoint_.start is None:
             print(breakpoint_.message)
             self._debugger.remove_breakpoint(breakpoint_.number)
         else:
-            print(f"breakpoint {breakpoint_.number} in line {breakpoint_.start.line}")
+            print(f"breakpoint {breakpoint_.number} in line {self._source.place(breakpoint_.start.span.start)}")
 
     do_break = do_b
+
+    @property
+    def _present(self) -> "Span":
+        """Where the selected process is."""
+        return self._debugger.stack(self._path)[0].span
+
+    def _file_number(self, name: str) -> int:
+        """Return the file of the program with this name."""
+        names = [self._source.file_path(file) for file in range(len(self._source.modules) + 1)]
+        return names.index(one_of("file of the program", name, names))
 
     def do_d(self, name: str) -> None:
         """Stop when a frame moves or changes."""
@@ -225,15 +238,15 @@ class Terminal(cmd.Cmd):
         for number, process in enumerate(self._debugger.processes, 1):
             mark = "*" if process.path == self._path else " "
             for frame in self._debugger.stack(process.path):
-                line = source.line(frame.span.start)
-                print(f"{mark}{number}  {frame.title}, line {line}: {source.line_text(line).strip()}")
+                place, text = source.place(frame.span.start), source.line_at(frame.span.start).strip()
+                print(f"{mark}{number}  {frame.title}, line {place}: {text}")
 
     def do_list(self, _: str) -> None:
         """Print the program around the current line."""
-        source = self._source
-        current = source.line(self._debugger.stack(self._path)[0].span.start)
-        for line in range(max(1, current - _LIST_CONTEXT), min(len(source.line_starts), current + _LIST_CONTEXT) + 1):
-            print(f"{'>' if line == current else ' '}{line:>4}  {source.line_text(line)}")
+        source, start = self._source, self._present.start
+        current, file = source.line(start), source.file_number(start)
+        for line in range(max(1, current - _LIST_CONTEXT), min(source.line_count(file), current + _LIST_CONTEXT) + 1):
+            print(f"{'>' if line == current else ' '}{line:>4}  {source.line_text(line, file)}")
 
     def do_th(self, number: str) -> None:
         """Select a process."""

@@ -94,6 +94,6 @@ def _refuse(error: "ExportError | RunError", source: "Source", *, as_json: bool)
         print(f"armwright: {source.name}: nothing was exported", file=sys.stderr)
         return
     details = {"class": type(error).__name__, "code": diagnostic.code, "message": diagnostic.message}
-    place = {"file": source.name, "line": source.line(diagnostic.span.start)}
+    place = {"file": source.name_at(diagnostic.span.start), "line": source.line(diagnostic.span.start)}
     data = {"exit_status": int(error.exit_status), "error": {**details, **place}}
     print_json({**data, "diagnostics": [to_json(diagnostic, source)]})

@@ -139,7 +139,7 @@ def error_data(diagnostics: "Iterable[Diagnostic]", source: "Source") -> dict[st
         "class": "ProgramError",
         "code": first.code,
         "message": first.message,
-        "file": source.name,
+        "file": source.name_at(first.span.start),
         "line": source.line(first.span.start),
     }
     return {"exit_status": int(ExitStatus.PROGRAM_ERRORS), "error": error}

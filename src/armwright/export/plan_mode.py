@@ -166,7 +166,7 @@ def _refuse_parallel(recording: Recording) -> None:
     for begin, end, effect, _ in _events(recording):
         if last is not None and begin < busy - _SAME_TIME:
             source = recording.code.source
-            text = f"{effect.kind} begins while {last.kind} in line {source.line(last.span.start)} is under way"
+            text = f"{effect.kind} begins while {last.kind} in line {source.place(last.span.start)} is under way"
             helps = ["let the branches of the COBEGIN do one thing after the other"]
             raise refusal(source, "E612", text, effect.span, "at the same time as something else", helps=helps)
         if end > busy:

@@ -19,7 +19,7 @@ class ExportError(ArmwrightError, ValueError):
         """Compose the message with the line of the program."""
         self.diagnostic, self.source = diagnostic, source
         line = source.line(diagnostic.span.start)
-        super().__init__(f"{source.name}:{line}: {diagnostic.code}: {diagnostic.message}")
+        super().__init__(f"{source.name_at(diagnostic.span.start)}:{line}: {diagnostic.code}: {diagnostic.message}")
 
 
 def refusal(

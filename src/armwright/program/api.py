@@ -1,10 +1,10 @@
 """Compile a program, and run it in a cell: each in one call."""
 
 import gc
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import attrs
 
@@ -13,7 +13,7 @@ from armwright.cell.hardware import Hardware, HardwareFactory
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, KindError, counted, one_of, shown
-from armwright.files.inputs import read_program, regular_file
+from armwright.files.inputs import file_below, read_program, regular_file
 from armwright.files.limits import limit, limit_message
 from armwright.physics.kinematic_cell import kinematic_cell
 from armwright.program.bytecode.assembler import assemble
@@ -24,14 +24,23 @@ from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard
+from armwright.program.modules.files import ParsedFile, parse_file, read_files
+from armwright.program.modules.linking import LinkedProgram, check_module, link
+from armwright.program.modules.names import declared_names
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
-from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport, known_cell
+from armwright.program.semantics.cell_symbols import (
+    ImportedFrames,
+    ImportedModule,
+    KnownCell,
+    ReadImport,
+    is_module,
+    known_cell,
+)
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
-from armwright.program.syntax.lexer import Token, TokenKind, scan
-from armwright.program.syntax.line_numbers import blank_line_numbers
-from armwright.program.syntax.parser import parse
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.tree import Program
 from armwright.program.vm.interpreter import Progress, interpret
 from armwright.program.vm.machine import Limits
 from armwright.program.vm.recording import Recording
@@ -45,12 +54,12 @@ class Compilation:
     """What became of a text.
 
     Attributes:
-        source: the text.
+        source: the text, with those of the modules that it imports.
         standard: the language it was read as.
-        tokens: its words.
+        tokens: its words, without those of modules.
         comments: where its comments stand.
         tree: what it says.
-        symbols: its names.
+        symbols: the names of the whole.
         imports: what its IMPORTs brought.
         flow: the arms of its statements; None where the syntax is wrong, or where only names were requested.
         diagnostics: what is wrong or odd, in the order of the text.
@@ -59,6 +68,9 @@ class Compilation:
             it imports; None where there is none, or only its names are known.
         cell_symbols: what was known of the cell when the program was checked.
         strict: whether an AFFIX that is only implied is an error.
+        whole: what it says together with all modules, in which every name stands for one thing.
+        spelling: how the names of the whole are written, by their keys.
+        brought: the names that modules give, as this file may write them, with their keys in the whole.
     """
 
     source: Source
@@ -74,6 +86,9 @@ class Compilation:
     cell: Cell | None = None
     cell_symbols: KnownCell | None = None
     strict: bool = False
+    whole: Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
+    spelling: Mapping[str, str] = attrs.field(factory=dict)
+    brought: Mapping[str, str] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -112,7 +127,8 @@ class ProgramError(ArmwrightError, ValueError):
         errors = [diagnostic for diagnostic in compilation.diagnostics if diagnostic.is_error]
         first, source = errors[0], compilation.source
         more = f" (and {counted(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
-        super().__init__(f"{source.name}:{source.line(first.span.start)}: {first.code}: {first.message}{more}")
+        place = f"{source.name_at(first.span.start)}:{source.line(first.span.start)}"
+        super().__init__(f"{place}: {first.code}: {first.message}{more}")
 
 
 def compile(  # noqa: A001 - what a translator does
@@ -259,8 +275,8 @@ def load(
 
 def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:
     """Return the paths of the files that a program imports."""
-    imports = (node for node in compiled.tree.headers if isinstance(node, tree.Import))
-    return tuple(program.parent / node.path.value for node in imports)
+    paths = (*(node.path.value for node in compiled.whole.imports), *(one.path for one in compiled.source.modules))
+    return tuple(program.parent / path for path in paths)
 
 
 def read_imported_cell(path: Path) -> Cell:
@@ -277,9 +293,11 @@ def read_imported_cell(path: Path) -> Cell:
 
 
 def import_reader(folder: Path) -> ReadImport:
-    """Return what reads the files that a program of this folder IMPORTs."""
+    """Return what reads the files that a program of this folder IMPORTs; modules lie in it or below."""
 
-    def read(name: str) -> ImportedFrames:
+    def read(name: str) -> ImportedFrames | ImportedModule:
+        if is_module(name):
+            return ImportedModule(text=read_program(file_below(folder, name)))
         cell = read_imported_cell(folder / name)
         return ImportedFrames(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
@@ -316,11 +334,13 @@ def _limit_imports(read_import: ReadImport) -> ReadImport:
     """Return what reads imports, and refuses more files than the limit, or more frames in all of them."""
     frames: dict[str, int] = {}
 
-    def read(name: str) -> ImportedFrames:
+    def read(name: str) -> ImportedFrames | ImportedModule:
         if name not in frames and len(frames) >= limit("imports"):
             raise InvalidValueError(f"too many files: {limit_message('imports')}")
         frames.setdefault(name, 0)
         brought = read_import(name)
+        if isinstance(brought, ImportedModule):
+            return brought
         frames[name] = len(brought.frames)
         together = sum(frames.values())
         if together > limit("frames"):
@@ -332,13 +352,12 @@ def _limit_imports(read_import: ReadImport) -> ReadImport:
 
 def _imported_cell(program: tree.Program, read_import: ReadImport) -> Cell | None:
     """Return the first cell with arms that a program imports; None without one."""
-    for header in program.headers:
-        if isinstance(header, tree.Import):
-            # What cannot be read is told when names are checked.
-            with suppress(ArmwrightError):
-                cell = read_import(header.path.value).cell
-                if cell is not None and cell.arms:
-                    return cell
+    for header in program.imports:
+        # What cannot be read is told when names are checked.
+        with suppress(ArmwrightError):
+            brought = read_import(header.path.value)
+            if isinstance(brought, ImportedFrames) and brought.cell is not None and brought.cell.arms:
+                return brought.cell
     return None
 
 
@@ -352,26 +371,43 @@ def _check_names(
     arguments: Arguments | None,
 ) -> Compilation:
     """Return a program with its syntax, names and types checked."""
-    text, diagnostics = blank_line_numbers(source)
-    scanned = scan(source, text, std)
-    program, syntax_errors = parse(source, scanned.tokens, std)
+    main = parse_file(source, PurePath(source.name).name, std)
     if read_import is not None:
         read_import = cache(_limit_imports(read_import))
-        cell = _imported_cell(program, read_import) if cell is None else cell
+    has_modules = std is Standard.RLO_2 and any(is_module(node.path.value) for node in main.tree.imports)
+    files = read_files(source, main, read_import) if has_modules else None
+    if files is not None:
+        source = files.source
+    if read_import is not None and cell is None:
+        cell = _imported_cell(main.tree, read_import)
     cell_symbols = known_cell(cell) if isinstance(cell, Cell) else cell
+    if files is None:
+        exported = declared_names(main.tree) if main.tree.module is not None else ()
+        linked = LinkedProgram(tree=main.tree, exported=frozenset(exported), diagnostics=check_module(main.tree))
+    else:
+        linked = link(files, cell_symbols.frames if cell_symbols is not None else ())
     symbols, name_errors, imports = check.check(
-        program, cell_symbols, std=std, read_import=read_import, arguments=arguments
+        linked.tree,
+        cell_symbols,
+        std=std,
+        read_import=read_import,
+        arguments=arguments,
+        exported=linked.exported,
+        has_unknown_names=files is not None and files.has_unknown_names,
     )
-    diagnostics += [*scanned.diagnostics, *syntax_errors]
+    diagnostics = [*main.diagnostics, *linked.diagnostics]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
     # Where the parser had to guess, a name may seem unused.
     diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]
     return Compilation(
         source=source,
         standard=std,
-        tokens=tuple(scanned.tokens),
-        comments=tuple(scanned.comments),
-        tree=program,
+        tokens=main.tokens,
+        comments=main.scanned.comments,
+        tree=main.tree,
+        whole=linked.tree,
+        brought=linked.brought,
+        spelling=_name_spellings((main,) if files is None else files.files.values(), linked),
         symbols=symbols,
         imports=imports,
         flow=None,
@@ -393,7 +429,7 @@ def analyse_flow(compiled: Compilation) -> Compilation:
     source, cell_symbols, strict = compiled.source, compiled.cell_symbols, compiled.strict
     with pause_garbage_collection():
         flow, diagnostics = analysis.check(
-            compiled.tree, compiled.symbols, _name_spellings(compiled), cell_symbols, strict=strict, source=source
+            compiled.whole, compiled.symbols, compiled.spelling, cell_symbols, strict=strict, source=source
         )
     return attrs.evolve(compiled, flow=flow, diagnostics=sort_diagnostics((*compiled.diagnostics, *diagnostics)))
 
@@ -402,10 +438,13 @@ def _generate_code(compiled: Compilation) -> Compilation:
     """Return a program with its intermediate code, unless it has errors."""
     if compiled.flow is None or any(diagnostic.is_error for diagnostic in compiled.diagnostics):
         return compiled
-    code = generate(compiled.source, compiled.tree, compiled.symbols, compiled.flow, _name_spellings(compiled))
+    code = generate(compiled.source, compiled.whole, compiled.symbols, compiled.flow, compiled.spelling)
     return attrs.evolve(compiled, code=attrs.evolve(code, standard=compiled.standard))
 
 
-def _name_spellings(compiled: Compilation) -> dict[str, str]:
-    """Return how a program first writes each of its names."""
-    return {token.key: token.text for token in reversed(compiled.tokens) if token.kind is TokenKind.NAME}
+def _name_spellings(files: Iterable[ParsedFile], linked: LinkedProgram) -> dict[str, str]:
+    """Return how a program first writes each of its names, its own file before those of its modules."""
+    tokens = [token for file in files for token in reversed(file.tokens) if token.kind is TokenKind.NAME]
+    spelling = {token.key: token.text for token in tokens}
+    qualified = (name for name in declared_names(linked.tree).values() if "." in name.key)
+    return spelling | {name.key: f"{name.key.partition('.')[0].lower()}.{name.text}" for name in qualified}

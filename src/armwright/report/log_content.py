@@ -182,20 +182,27 @@ def run_log_content(recording: Recording) -> LogContent:
         if len(s.t)
     ]
     events = [
-        LogEvent(t=e.t0, text=e.text, process=e.process, file=source.name, line=source.line(e.span.start))
+        LogEvent(
+            t=e.t0, text=e.text, process=e.process, file=source.name_at(e.span.start), line=source.line(e.span.start)
+        )
         for e in recording.traced_effects()
     ]
     if (failure := recording.failure) is not None:
         where = source.line(failure.diagnostic.span.start)
         text = f"{failure.diagnostic.code}: {failure.diagnostic.message}"
         error = LogEvent(
-            t=failure.time, text=text, process=failure.process, file=source.name, line=where, is_error=True
+            t=failure.time,
+            text=text,
+            process=failure.process,
+            file=source.name_at(failure.diagnostic.span.start),
+            line=where,
+            is_error=True,
         )
         events = sorted([*events, error], key=lambda event: event.t)
     animation, _ = run_animation(recording, _FRAMES_PER_SECOND, _MAX_INSTANTS)
     arms = {name: (arm.arm, arm.base) for name, arm in cell.arms.items()}
     return LogContent(
-        about=_about(arms, program=source.name, text=source.text, cell=cell.name),
+        about=_about(arms, program=source.name, text=source.main.text, cell=cell.name),
         tracks=[*planned, *measured],
         animation=animation,
         events=events,

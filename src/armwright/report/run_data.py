@@ -67,13 +67,13 @@ def run_page_data(
         duration=recording.duration,
         messages=[
             *(
-                Message(severity=d.severity.value, code=d.code, line=source.line(d.span.start), text=d.message)
+                Message(severity=d.severity.value, code=d.code, line=source.listing_line(d.span.start), text=d.message)
                 for d in listed
             ),
             *(Message(severity="note", text=text) for text in notes),
         ],
         effects=_effects(recording),
-        stages=[_stage_row(run, source.line(run.span.start), cell.arms[run.arm].arm) for run in stages],
+        stages=[_stage_row(run, source.listing_line(run.span.start), cell.arms[run.arm].arm) for run in stages],
         arms=_arm_records(recording),
         animation=animation,
         collisions=collision_text(recording),
@@ -116,7 +116,7 @@ def _effects(recording: Recording) -> list[Effect]:
     effects = excerpt(recording.effects, MAX_LIST_ITEMS)
 
     def shown(effect: RunEffect) -> Effect:
-        number, process = recording.code.source.line(effect.span.start), effect.process if several else ""
+        number, process = recording.code.source.listing_line(effect.span.start), effect.process if several else ""
         text, arm = shorten_line(effect.text), effect.arm or ""
         return Effect(t0=effect.t0, t1=effect.t1, line=number, text=text, process=process, arm=arm)
 

@@ -17,6 +17,7 @@ from armwright.files.inputs import hash_of_read_file
 from armwright.files.output import Content, sha256, write_folder
 from armwright.motion.plan import PlannedStage
 from armwright.program.language.diagnostic import Diagnostic, to_json
+from armwright.program.language.source import Source, Span
 from armwright.program.vm.excerpt import EVENT_LOG_HINT, MAX_LIST_ITEMS, Excerpt, excerpt, omission_text, shorten_list
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import (
@@ -148,12 +149,18 @@ def ending_data(recording: Recording) -> dict[str, Any]:
     error = {
         "class": RunError.__name__,
         **to_json(failure.diagnostic, source),
-        "file": source.name,
+        "file": source.name_at(failure.diagnostic.span.start),
         "statement": " ".join(source.slice(failure.diagnostic.span).split()),
         "time": failure.time,
         "arm": failure.arm,
     }
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
+
+
+def source_place(source: Source, span: Span) -> dict[str, Any]:
+    """Return the line of a place, and in a module the name of its file, as plain data."""
+    line = {"line": source.line(span.start)}
+    return {**line, "file": source.name_at(span.start)} if source.file_number(span.start) else line
 
 
 def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: str = EVENT_LOG_HINT) -> dict[str, Any]:
@@ -171,7 +178,7 @@ def summary_data(recording: Recording, diagnostics: Sequence[Diagnostic], hint: 
         "duration": recording.duration,
         "trace": shorten_list(recording.trace(), MAX_LIST_ITEMS, hint),
         "contacts": [
-            {"line": source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
+            {**source_place(source, e.span), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
             for e in _contacts(recording).join()
         ],
         "collisions": collision_text(recording),
@@ -192,7 +199,7 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
     arm = recording.cell.arms[run.arm].arm
     motion = run.motion
     return {
-        "line": recording.code.source.line(run.span.start),
+        **source_place(recording.code.source, run.span),
         "arm": run.arm,
         "kind": run.stage.kind,
         "to": list(run.goal_names),
@@ -253,7 +260,7 @@ def _event_lines(recording: Recording) -> Iterator[str]:
         event = {
             "t0": effect.t0,
             "t1": effect.t1,
-            "line": source.line(effect.span.start),
+            **source_place(source, effect.span),
             "column": source.column(effect.span.start),
             "kind": effect.kind,
             "process": effect.process,

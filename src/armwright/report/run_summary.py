@@ -40,13 +40,13 @@ class RunSummary:
         if recording.failure is not None:
             return ()
         slowed = [
-            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]} runs "
+            f"line {recording.code.source.place(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]} runs "
             f"{run.stage.slowed}"
             for run in recording.stages
             if run.stage.slowed
         ]
         planned = [
-            f"line {recording.code.source.line(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]}: "
+            f"line {recording.code.source.place(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]}: "
             f"{path_text(run.path)}"
             for run in recording.stages
             if run.path is not None
@@ -89,7 +89,7 @@ class RunSummary:
 
         def row(effect: Effect) -> tuple[str, ...]:
             end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
-            times = str(recording.code.source.line(effect.span.start)), f"{effect.t0:.3f}", end
+            times = recording.code.source.place(effect.span.start), f"{effect.t0:.3f}", end
             return (*times, *((effect.process,) if several else ()), shorten_line(effect.text, self.hint))
 
         effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], MAX_TERMINAL_LINES)
@@ -120,7 +120,7 @@ class RunSummary:
             title = f"{run.arm} {stage.kind} {' '.join(run.goal_names)}{', stopped' if run.stopped else ''}"
             numbers = f"{run.t0:.3f}", f"{run.duration:.3f}", f"{run.length * 1e3:.0f}"
             deviation = "" if stage.deviation is None else f"{stage.deviation * 1e3:.3f}"
-            line = str(self.recording.code.source.line(run.span.start))
+            line = self.recording.code.source.place(run.span.start)
             rows.append((line, title, *numbers, deviation, *peaks))
         return ResultTable(
             title="",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from armwright.cell.model import Cell
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, InvalidValueError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_program
 from armwright.files.output import write_back
@@ -17,6 +18,7 @@ from armwright.program.flow_analysis.side_effects import walk_statements
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCodec, column_count
 from armwright.program.language.source import Source
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, is_module
 from armwright.program.syntax.nodes import ArmName, Name
 from armwright.program.syntax.tree import Blend, Directly, Move, Straightly, Via, clause_word
 
@@ -30,6 +32,13 @@ _LONGEST = 500_000
 _MOST_DIAGNOSTICS = 200
 # Completions that it gets.
 _MOST_COMPLETIONS = 60
+
+
+def _read_import(folder: Path, name: str) -> ImportedFrames | ImportedModule:
+    """Read what an IMPORT of a program in a folder names; modules have texts that the studio does not show."""
+    if is_module(name):
+        raise InvalidValueError("the studio shows programs of one file; `armwright run` runs those with modules")
+    return import_reader(folder)(name)
 
 
 class ProgramTextError(ArmwrightError, ValueError):
@@ -131,7 +140,7 @@ class ProgramText:
         self._diagnostics = [self._diagnostic_state(it) for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]]
 
     def _compiled(self, text: str) -> Compilation:
-        read_import = None if self.path is None else import_reader(self.path.parent)
+        read_import = None if self.path is None else partial(_read_import, self.path.parent)
         return compile_program(Source(self.name, text), self._cell, read_import=read_import)
 
     def completions(self, text: str, offset: int) -> list[dict[str, Any]]:

@@ -34,6 +34,7 @@ WORDS = {
     "FORCE": ("Force",),
     "UNITNAME": ("mm", "DEG"),
     **IN_CONTEXT,
+    "DOTTED": ("grip.take", "Slot.Left"),
     "RELOP": ("<", "<=", "<>", ">=", ">"),
     "ADDOP": ("+", "-"),
     "MULOP": ("*", "/"),

@@ -32,12 +32,12 @@ from armwright.program.language.words import Standard
 
 HEAD = "; armwright intermediate code, form 1"
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:-[0-9]+)?")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:\.[A-Za-z][A-Za-z0-9_]*)*(?:-[0-9]+)?")
 _PASSING = re.compile(r"%[0-9]+")
 _STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _OPERAND_OR_COMMENT = re.compile(r'"(?:[^"\\]|\\.)*"|;.*|[^\s;]+')
 _ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z][A-Za-z0-9]*)(?P<rest>.*)")
-_SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
+_SPAN = re.compile(r"(?:(?P<file>[0-9]+)/)?(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
 _TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
 # What a file may ask for at most.
 _MAX_ELEMENTS = 1_000_000
@@ -73,12 +73,16 @@ def _lines(code: Code) -> Iterator[str]:
     yield "code"
     for at, step in enumerate(code.instructions):
         source, span = code.source, step.span
+        file = source.file_number(span.start)
         place = f"{source.line(span.start)}:{source.column(span.start)}+{span.end - span.start}"
+        place = f"{file}/{place}" if file else place
         operands = (repr(float(part)) if isinstance(part, float | int) else str(part) for part in step.operands)
         row = f"{at:04d}  {place + ('!' if step.begins else ''):<12} {step.op:<6} {' '.join(operands)}".rstrip()
         yield f"{row:<56} ; {step.comment}" if step.comment else row
-    yield "source"
-    yield from (f"| {json.dumps(line, ensure_ascii=False)[1:-1]}" for line in code.source.text.split("\n"))
+    for file in range(len(code.source.modules) + 1):
+        yield f"module {json.dumps(code.source.modules[file - 1].path, ensure_ascii=False)}" if file else "source"
+        lines = code.source.file_text(file).split("\n")
+        yield from (f"| {json.dumps(line, ensure_ascii=False)[1:-1]}" for line in lines)
 
 
 # ---- reading -------------------------------------------------------------------------------------------------------
@@ -116,8 +120,7 @@ class _Reader:
         self._text = Source("", "")
 
     def code(self) -> Code:
-        body, text = self._split()
-        self._text = Source("", text)
+        body, self._text = self._split()
         words: Mapping[str, Callable[[str], None]] = {
             "program": self._read_program,
             "units": self._read_units,
@@ -152,24 +155,31 @@ class _Reader:
             self._fail("expected at least one instruction")
         return self._verified()
 
-    def _split(self) -> tuple[list[str], str]:
-        """Return the lines in front of the source, and the source."""
+    def _split(self) -> tuple[list[str], Source]:
+        """Return the lines in front of the source, and the source with its modules."""
         if "source" not in self._rows:
             self._number = len(self._rows)
             self._fail("the program text is missing; expected it after a line `source`")
         at = self._rows.index("source")
-        lines = []
+        paths, texts = [""], list[list[str]]([[]])
         for number, row in enumerate(self._rows[at + 1 :], at + 2):
             self._number = number
             if not row and self._number == len(self._rows):
                 break
+            if row.startswith("module "):
+                paths.append(self._string(row.removeprefix("module ").strip()))
+                texts.append([])
+                continue
             if not row.startswith("| ") and row != "|":
                 self._fail("expected a line of the program text, which begins with `| `")
             line = _json_text(f'"{row[2:]}"')
             if line is None:
                 self._fail("expected the characters of a JSON string")
-            lines.append(line)
-        return self._rows[:at], "\n".join(lines)
+            texts[-1].append(line)
+        source = Source("", "\n".join(texts[0]))
+        for path, lines in zip(paths[1:], texts[1:], strict=True):
+            source = source.with_module(path, "\n".join(lines))
+        return self._rows[:at], source
 
     def _read_program(self, rest: str) -> None:
         self._program = self._string(rest)
@@ -235,10 +245,12 @@ class _Reader:
     def _span(self, match: re.Match[str]) -> Span:
         """Return the part of the program that a location such as 12:5+20 stands for."""
         line, column, length = (int(match[part][:9]) for part in ("line", "column", "length"))
-        text = self._text
-        if not 1 <= line <= len(text.line_starts):
+        file, text = int((match["file"] or "0")[:9]), self._text
+        if file > len(text.modules):
+            self._fail(f"the program has no module {file}")
+        if not 1 <= line <= text.line_count(file):
             self._fail(f"the program text has no line {line}")
-        start = text.line_starts[line - 1] + column - 1
+        start = text.line_start(line, file) + column - 1
         if column < 1 or start + length > len(text.text):
             self._fail(f"the program text has fewer than {length} characters from {line}:{column} on")
         return Span(start, start + length)
@@ -268,7 +280,7 @@ class _Reader:
             units=self._units,
             spelling=self._spelling,
             standard=self._standard,
-            source=Source(self._program, self._text.text),
+            source=attrs.evolve(self._text, name=self._program),
         )
         try:
             verify(code)

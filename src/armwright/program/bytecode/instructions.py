@@ -333,13 +333,14 @@ class Code:
 
 def listing(code: Code) -> str:
     """Return the code for people: number, line, operation, operands, remarks; then the constants."""
-    width = max(3, *(len(str(code.line(step))) for step in code.instructions))
+    places = [code.source.place(step.span.start) for step in code.instructions]
+    width = max(3, *map(len, places))
     starts = {procedure.start: name for name, procedure in code.procedures.items()}
     rows = [f"{'line':>{width + 7}}  op     operands"]
-    for at, step in enumerate(code.instructions):
+    for at, (step, place) in enumerate(zip(code.instructions, places, strict=True)):
         if at in starts:
             rows.append(f"{'':{width + 9}}{code.spelled(starts[at])}:")
-        row = f"{at:04d} {code.line(step):>{width}}    {step.op:<6} {' '.join(shown_operands(code, step))}".rstrip()
+        row = f"{at:04d} {place:>{width}}    {step.op:<6} {' '.join(shown_operands(code, step))}".rstrip()
         rows.append(f"{row:<37} ; {step.comment}" if step.comment else row)
     if code.constants:
         rows += ["", *(f"c{index:<4} {_number_list(value)}" for index, value in enumerate(code.constants))]

@@ -1,6 +1,5 @@
 """Requests of an editor: the session, breakpoints, and what a stopped program looks like: stacks, variables, values."""
 
-import os
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -10,7 +9,13 @@ from typing import Any
 from armwright.errors import ArmwrightError
 from armwright.files.inputs import regular_file
 from armwright.program.debugger.dap_messages import Arguments, RequestError
-from armwright.program.debugger.dap_session import CODE_SOURCE_REFERENCE, EditorSession, FrameReference, LaunchRequest
+from armwright.program.debugger.dap_session import (
+    CODE_SOURCE_REFERENCE,
+    EditorSession,
+    FrameReference,
+    LaunchRequest,
+    SourceKey,
+)
 from armwright.program.debugger.debugger import Command
 from armwright.program.debugger.expressions import visible_names
 from armwright.program.debugger.variables import ArrayElements, Variable
@@ -142,28 +147,18 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
     requests = arguments.get_objects("breakpoints")
     for request in requests:
         request.get(int, "line")
-    if session.launch is not None and not _is_debugged(session, source):
-        message = "this is not the program that is debugged"
-        return {"breakpoints": [{"id": next(session.ids), "verified": False, "message": message} for _ in requests]}
+    key = _source_key(source)
     if session.debugger is not None:
-        session.debugger.execution.breakpoints.clear()
-    session.breakpoints = [(next(session.ids), request) for request in requests]
-    return {"breakpoints": [session.set_breakpoint(*request) for request in session.breakpoints]}
+        bound = {number for number, _ in session.breakpoints.get(key, ())}
+        known = session.debugger.execution.breakpoints
+        known[:] = [one for one in known if session.breakpoint_ids.get(one.number) not in bound]
+    session.breakpoints[key] = [(next(session.ids), request) for request in requests]
+    return {"breakpoints": [session.set_breakpoint(key, *request) for request in session.breakpoints[key]]}
 
 
-def _is_debugged(session: EditorSession, source: Arguments) -> bool:
-    """Whether a text is that of the program, which lies in a file of its own or in a file of code."""
-    if session.loaded is not None and session.loaded.is_code_file:
-        return source.get(int, "sourceReference", 0) == CODE_SOURCE_REFERENCE
-    path = source.get(str, "path", "")
-    return bool(path) and session.launch is not None and _is_same_file(path, session.launch.program)
-
-
-def _is_same_file(path: str, program: Path) -> bool:
-    try:
-        return os.path.realpath(path) == os.path.realpath(program)
-    except ValueError:  # a zero byte
-        return False
+def _source_key(source: Arguments) -> SourceKey:
+    """Return what an editor calls a source."""
+    return source.get(int, "sourceReference", 0) or source.get(str, "path", "")
 
 
 def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -171,7 +166,9 @@ def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[s
     first = arguments.get(int, "line")
     offset = 1 - session.first_line
     statements = session.launched_debugger.execution.statements
-    starts = statements.in_lines(first + offset, arguments.get(int, "endLine", first) + offset)
+    file = session.file_number(_source_key(arguments.get_object("source"))) if "source" in arguments else 0
+    last = arguments.get(int, "endLine", first)
+    starts = () if file is None else statements.in_lines(first + offset, last + offset, file)
     return {"breakpoints": [session.location(start.span) for start in starts]}
 
 
@@ -237,7 +234,7 @@ def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
         if first <= level < first + count:
             session.frame_references.append((path, level))
             number, location = len(session.frame_references), session.location(frame.span)
-            answers.append({"id": number, "name": frame.title, "source": session.source(), **location})
+            answers.append({"id": number, "name": frame.title, "source": session.source(frame.span), **location})
     return {"stackFrames": answers, "totalFrames": len(frames)}
 
 
@@ -331,9 +328,11 @@ def exception_info(session: EditorSession, _: Arguments) -> dict[str, Any]:
     return {"exceptionId": diagnostic.code, "description": diagnostic.message, "breakMode": mode, "details": details}
 
 
-def source(session: EditorSession, _: Arguments) -> dict[str, Any]:
-    """Answer ``source``: the text as it was when it was loaded."""
-    return {"content": session.launched_debugger.code.source.text}
+def source(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``source``: the text of the program or of a module as it was when it was loaded."""
+    text = session.launched_debugger.code.source
+    file = session.file_number(arguments.get(int, "sourceReference", CODE_SOURCE_REFERENCE))
+    return {"content": text.file_text(file or 0)}
 
 
 def _slot_named(group: Iterable[Variable], name: str) -> str | None:

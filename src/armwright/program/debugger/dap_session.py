@@ -1,6 +1,7 @@
 """One debugging session of an editor: the program, the debugger, and what the editor has been told so far."""
 
 import itertools
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -63,6 +64,8 @@ class MissingCellError(ArmwrightError, ValueError):
     exit_status = ExitStatus.USAGE
 
 
+# A source as an editor names it: the path of a file, or the number of a text of a file of code.
+SourceKey: TypeAlias = str | int
 # A stack frame: the process, and the level of its stack.
 FrameReference: TypeAlias = tuple[ProcessPath, int]
 Load = Callable[[LaunchRequest], LoadedProgram]
@@ -81,11 +84,11 @@ class EditorSession:
         loaded: what became of it.
         connected: whether the editor has not left yet.
         after_response: what is to be done once the present request is answered.
-        codec: counts the columns of its text as editors do, in UTF-16 as JavaScript.
+        codecs: count the columns of each of its files as editors do, in UTF-16 as JavaScript.
         configured: whether breakpoints have been set, so that the program may begin.
         has_begun: whether it has.
         has_ended: whether its end has been reported.
-        breakpoints: the breakpoints that were requested, with their numbers.
+        breakpoints: the breakpoints that were requested, by the source that they are in, with their numbers.
         data_breakpoints: the data breakpoints that were requested, with their numbers.
         exception_filters: the errors to stop at, ``uncaught`` and ``caught``.
         frame_references: of the stacks that the editor has seen, process and level.
@@ -100,11 +103,11 @@ class EditorSession:
         self.debugger: Debugger | None = None
         self.launch: LaunchRequest | None = None
         self.loaded: LoadedProgram | None = None
-        self.codec = PositionCodec("", UTF_16)
+        self.codecs: list[PositionCodec] = []
         self.connected, self.after_response = True, list[Callable[[], None]]()
         self.configured = self.has_begun = self.has_ended = False
         self.first_line = self.first_column = 1
-        self.breakpoints: list[tuple[int, Arguments]] = []
+        self.breakpoints: dict[SourceKey, list[tuple[int, Arguments]]] = {}
         self.data_breakpoints: list[tuple[int, Arguments]] = []
         self.breakpoint_ids: dict[int, int] = {}
         self.exception_filters = frozenset({"uncaught"})
@@ -134,7 +137,8 @@ class EditorSession:
             raise
         assert loaded.cell is not None  # noqa: S101 - a program without a cell is not loaded
         self.launch, self.loaded = launch, loaded
-        self.codec = PositionCodec(loaded.code.source.text, UTF_16)
+        text = loaded.code.source
+        self.codecs = [PositionCodec(text.file_text(file), UTF_16) for file in range(len(text.modules) + 1)]
         self.debugger = Debugger(loaded.code, loaded.cell, hardware=loaded.hardware)
         self.has_begun = self.has_ended = False
         self.forget_references()
@@ -240,7 +244,7 @@ class EditorSession:
 
     def write(self, text: str, category: str, span: Span | None = None) -> None:
         """Show a text to the user, with the location in the program that it comes from."""
-        position = {} if span is None else {"source": self.source(), **self.location(span, full=False)}
+        position = {} if span is None else {"source": self.source(span), **self.location(span, full=False)}
         self.send("output", {"category": category, "output": text, **position})
 
     def _report_effects(self, debugger: Debugger) -> None:
@@ -281,16 +285,36 @@ class EditorSession:
         self.frame_references.clear()
         self.variable_references.clear()
 
-    def source(self) -> dict[str, Any]:
-        """Return what the editor has to know of the text."""
-        assert self.launch is not None  # noqa: S101 - asked for only with a program
-        if self.loaded is not None and self.loaded.is_code_file:
-            return {"name": self.loaded.code.source.name, "sourceReference": CODE_SOURCE_REFERENCE}
-        return {"name": self.launch.program.name, "path": str(self.launch.program)}
+    def source(self, span: Span) -> dict[str, Any]:
+        """Return what the editor has to know of the file that a stretch of the text is in."""
+        assert self.launch is not None and self.loaded is not None  # noqa: S101, PT018 - asked for only with a program
+        text = self.loaded.code.source
+        file = text.file_number(span.start)
+        if self.loaded.is_code_file:
+            return {"name": text.file_path(file), "sourceReference": CODE_SOURCE_REFERENCE + file}
+        path = self._file_path(file)
+        return {"name": path.name, "path": str(path)}
+
+    def file_number(self, source: SourceKey) -> int | None:
+        """Return which file of the program a source of the editor is; None where it is another one."""
+        assert self.launch is not None and self.loaded is not None  # noqa: S101, PT018 - asked for only with a program
+        files = range(len(self.codecs))
+        if isinstance(source, int) or self.loaded.is_code_file:
+            number = source - CODE_SOURCE_REFERENCE if isinstance(source, int) else -1
+            return number if self.loaded.is_code_file and number in files else None
+        return next((file for file in files if source and _is_same_file(source, self._file_path(file))), None)
+
+    def _file_path(self, file: int) -> Path:
+        """Return the path of the program or of one of its modules."""
+        assert self.launch is not None and self.loaded is not None  # noqa: S101, PT018 - asked for only with a program
+        program = self.launch.program
+        return program.parent / self.loaded.code.source.modules[file - 1].path if file else program
 
     def location(self, span: Span, *, full: bool = True) -> dict[str, int]:
-        """Return where a stretch of the text is, in the numbers of the editor."""
-        (line, column), (end_line, end_column) = map(self.codec.line_and_column, span)
+        """Return where a stretch of the text is in its file, in the numbers of the editor."""
+        text = self.launched_debugger.code.source
+        codec, first = self.codecs[text.file_number(span.start)], text.file_start(span.start)
+        (line, column), (end_line, end_column) = map(codec.line_and_column, span.moved(-first))
         start = {"line": line + self.first_line, "column": column + self.first_column}
         end = {"endLine": end_line + self.first_line, "endColumn": end_column + self.first_column}
         return start | end if full else start
@@ -325,8 +349,10 @@ class EditorSession:
         if self.debugger is None:
             return
         self.debugger.execution.breakpoints.clear()
-        for number, request in self.breakpoints:
-            self.send("breakpoint", {"reason": "changed", "breakpoint": self.set_breakpoint(number, request)})
+        for source, requests in self.breakpoints.items():
+            for number, request in requests:
+                bound = self.set_breakpoint(source, number, request)
+                self.send("breakpoint", {"reason": "changed", "breakpoint": bound})
         for number, request in self.data_breakpoints:
             self.set_data_breakpoint(number, request)
 
@@ -340,20 +366,32 @@ class EditorSession:
         self.breakpoint_ids[watch.number] = number
         return {"id": number, "verified": True}
 
-    def set_breakpoint(self, number: int, request: Arguments) -> dict[str, Any]:
-        """Set a breakpoint; return what the editor has to know of it."""
+    def set_breakpoint(self, source: SourceKey, number: int, request: Arguments) -> dict[str, Any]:
+        """Set a breakpoint in a source of the editor; return what the editor has to know of it."""
         if self.debugger is None:
             return {"id": number, "verified": False, "message": "no program has been launched"}
+        file = self.file_number(source)
+        if file is None:
+            return {"id": number, "verified": False, "message": "this is not the program that is debugged"}
         line, column = request.get(int, "line") - self.first_line + 1, None
         if "column" in request:
-            offset = self.codec.offset(line - 1, request.get(int, "column") - self.first_column)
-            column = self.debugger.code.source.column(offset)
+            offset = self.codecs[file].offset(line - 1, request.get(int, "column") - self.first_column)
+            text = self.debugger.code.source
+            column = text.column(offset + (text.modules[file - 1].start if file else 0))
         conditions, log_message = _breakpoint_conditions(request), request.get(str, "logMessage", "")
-        breakpoint_ = self.debugger.add_breakpoint(line, column, **conditions, log_message=log_message)
+        breakpoint_ = self.debugger.add_breakpoint(line, column, file=file, **conditions, log_message=log_message)
         self.breakpoint_ids[breakpoint_.number] = number
         if breakpoint_.start is None:
             return {"id": number, "verified": False, "message": breakpoint_.message}
-        return {"id": number, "verified": True, "source": self.source(), **self.location(breakpoint_.start.span)}
+        span = breakpoint_.start.span
+        return {"id": number, "verified": True, "source": self.source(span), **self.location(span)}
+
+
+def _is_same_file(path: str, other: Path) -> bool:
+    try:
+        return os.path.realpath(path) == os.path.realpath(other)
+    except ValueError:  # a zero byte
+        return False
 
 
 def _breakpoint_conditions(request: Arguments) -> dict[str, str]:

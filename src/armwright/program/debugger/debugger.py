@@ -186,6 +186,7 @@ class Debugger:
         line: int,
         column: int | None = None,
         *,
+        file: int = 0,
         condition: str = "",
         hit_condition: str = "",
         log_message: str = "",
@@ -195,6 +196,7 @@ class Debugger:
         Args:
             line: from 1; where no statement begins in it, the next in which one does.
             column: from 1, to choose among the statements of a line.
+            file: of the line: 0 for the program itself, 1 for its first module.
             condition: an expression that must be true.
             hit_condition: how often the statement must have been come to: ``3``, ``>= 3``, ``% 3``.
             log_message: say this instead of stopping; expressions in braces are worked out.
@@ -202,7 +204,7 @@ class Debugger:
         Returns:
             The breakpoint; one without a ``start`` stops nothing, and its ``message`` says why.
         """
-        start = self.execution.statements.find(line, column) if line >= 1 else None
+        start = self.execution.statements.find(line, column, file) if line >= 1 else None
         message = "no statement begins on this line or below" if line >= 1 else f"lines are numbered from 1, got {line}"
         if start is not None:
             try:

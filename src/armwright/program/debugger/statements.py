@@ -19,12 +19,14 @@ class StatementStart:
     Attributes:
         index: of its first instruction.
         span: in the text; of a statement that holds others only its head.
-        line: from 1.
+        line: from 1, in its file.
+        file: which file it stands in, as ``Source.file_number`` counts them.
     """
 
     index: int
     span: Span
     line: int
+    file: int = 0
 
 
 class Statements:
@@ -38,7 +40,7 @@ class Statements:
         starts = tuple(self._find_starts())
         self._by_index = {start.index: start for start in starts}
         # A line is entered by the first statement in it; a FOR has a second beginning for each further pass.
-        self._by_position = sorted(starts, key=lambda start: (start.line, start.span.start, start.index))
+        self._by_position = sorted(starts, key=lambda start: (start.file, start.line, start.span.start, start.index))
 
     def statement_at(self, index: int) -> StatementStart:
         """Return the statement that an instruction belongs to; behind the last one, the last."""
@@ -47,7 +49,8 @@ class Statements:
         start = self._by_index[self._start_indices[max(number, 0)]]
         step = self._code.instructions[index]
         if step.op in _TRAILING and not step.begins:
-            return StatementStart(index=index, span=step.span, line=self._code.line(step))
+            file = self._code.source.file_number(step.span.start)
+            return StatementStart(index=index, span=step.span, line=self._code.line(step), file=file)
         return start
 
     def procedure_at(self, index: int) -> str | None:
@@ -55,12 +58,13 @@ class Statements:
         number = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1
         return self._procedures[number][1] if number >= 0 else None
 
-    def find(self, line: int, column: int | None = None) -> StatementStart | None:
+    def find(self, line: int, column: int | None = None, file: int = 0) -> StatementStart | None:
         """Return the statement at which a run can be stopped for a line.
 
         Args:
             line: from 1.
             column: from 1; the statement that begins there or is the next in this line.
+            file: of the line, as ``Source.file_number`` counts them.
 
         Returns:
             The first statement that begins in the line, or in the next line in which one does; None where no
@@ -69,15 +73,15 @@ class Statements:
         source = self._code.source
         for start in self._by_position:
             early = column is not None and start.line == line and source.column(start.span.start) < column
-            if start.line >= line and not early:
+            if start.file == file and start.line >= line and not early:
                 return start
         return None
 
-    def in_lines(self, first: int, last: int) -> Iterator[StatementStart]:
-        """Give the statements that begin in some lines, in the order of the text, each once."""
+    def in_lines(self, first: int, last: int, file: int = 0) -> Iterator[StatementStart]:
+        """Give the statements that begin in some lines of a file, in the order of the text, each once."""
         lines = set()
         for start in self._by_position:
-            if first <= start.line <= last and start.span.start not in lines:
+            if start.file == file and first <= start.line <= last and start.span.start not in lines:
                 lines.add(start.span.start)
                 yield start
 
@@ -90,4 +94,4 @@ class Statements:
             index = min(step.span.start for step in instructions_of_statement)
             # A condition or an action of a MOVE lies inside of its statement, and never begins before it.
             span = Span(index, max(step.span.end for step in instructions_of_statement if step.span.start == index))
-            yield StatementStart(index=first, span=span, line=source.line(index))
+            yield StatementStart(index=first, span=span, line=source.line(index), file=source.file_number(index))

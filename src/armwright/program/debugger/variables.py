@@ -133,7 +133,7 @@ def _frame_contents(machine: Machine, slot: str) -> list[Variable]:
         if machine.state.tree.nodes[slot].rigid:
             lines.append(Variable(name="rigid", value="true"))
     if slot in machine.state.pose_origins:
-        line = machine.code.source.line(machine.state.pose_origins[slot].start)
+        line = machine.code.source.place(machine.state.pose_origins[slot].start)
         lines.append(Variable(name="set in line", value=str(line)))
     return lines
 
@@ -229,7 +229,7 @@ def _motion_text(machine: Machine, arm: str) -> str:
         return "nothing"
     motion = process.motion
     stage = machine.state.stages[motion.stage_index]
-    line = machine.code.source.line(motion.span.start)
+    line = machine.code.source.place(motion.span.start)
     since = machine.now - stage.t0
     return f"{stage.stage.kind} {' '.join(stage.goal_names)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
 

@@ -2,7 +2,8 @@
 
 ``// std=83`` and ``// strict`` are the options of the command line. ``// cell: arms ARM_1, ARM_2`` tells what a
 program is checked against, and so do ``frames``, ``devices``, ``visions``, ``inputs`` and ``analogue``;
-``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the program run in a
+``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings, and ``// module: grip.rlo: MODULE grip ; END.``
+has the text of a module. ``// run in one_arm`` has the program run in a
 cell that comes with the pages, with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command
 line; ``// effort: 60 in joint 2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported
 afterwards, by ``armwright.export``.
@@ -23,7 +24,7 @@ from armwright.program.api import compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, KnownCell, ReadImport
 from armwright.program.vm.interpreter import motion_warnings
 from armwright.program.vm.machine import Limits, RunError
 from armwright.program.vm.recording import Recording
@@ -37,6 +38,7 @@ _LIMIT = re.compile(r"^// limits: (steps|depth|time) (\d+)$", re.MULTILINE)
 _PHYSICS = re.compile(r"^// physics$", re.MULTILINE)
 _KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions|inputs|analogue) (.+)$", re.MULTILINE)
 _IMPORT = re.compile(r"^// import: (\S+): (.+)$", re.MULTILINE)
+_MODULE = re.compile(r"^// module: (\S+): (.+)$", re.MULTILINE)
 _OLD = re.compile(r"^// std=83$", re.MULTILINE)
 _STRICT = re.compile(r"^// strict$", re.MULTILINE)
 
@@ -124,9 +126,13 @@ def _import_reader(text: str) -> ReadImport | None:
     """Return a reader of the files that a program is told of; any other file is missing."""
     files = {path: _frame_parents(names.split(", ")) for path, names in _IMPORT.findall(text)}
 
-    def read(path: str) -> ImportedFrames:
+    modules = dict(_MODULE.findall(text))
+
+    def read(path: str) -> ImportedFrames | ImportedModule:
+        if path in modules:
+            return ImportedModule(text=modules[path])
         if path not in files:
             raise FileFormatError(path, None, "", "there is no such file")
         return ImportedFrames(frames=files[path])
 
-    return read if files else None
+    return read if files or modules else None

@@ -55,7 +55,7 @@ class FixResult:
     @property
     def text(self) -> str:
         """The program as it is now."""
-        return self.compilation.source.text
+        return self.compilation.source.main.text
 
 
 def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_ROUNDS) -> FixResult:
@@ -73,7 +73,13 @@ def apply_fixes(source: Source, compile_source: Compile, *, rounds: int = MAX_RO
     cures: list[AppliedFix] = []
     rejected: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
-        offered = [one for one in current.diagnostics if one.fixes and _message_id(one, current.source) not in rejected]
+        offered = [
+            one
+            for one in current.diagnostics
+            if one.fixes
+            and not current.source.file_number(one.span.start)
+            and _message_id(one, current.source) not in rejected
+        ]
         selected = select_disjoint(offered)
         if not selected:
             break
@@ -108,7 +114,7 @@ def _touches(span: Span, taken: Sequence[Span]) -> bool:
 def _apply(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
     """Return a program with the changes made that diagnostics offer."""
     edits = tuple(TextEdit(fix.span, fix.replacement) for diagnostic in diagnostics for fix in diagnostic.fixes)
-    return Source(source.name, apply_edits(source.text, edits))
+    return Source(source.name, apply_edits(source.main.text, edits))
 
 
 def _improves(selected: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
@@ -171,7 +177,7 @@ def _select_improving(
 
 def _message_id(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
     """Return a key, the message and the text of its line, that identifies it after other lines have changed."""
-    return diagnostic.message, source.line_text(source.line(diagnostic.span.start))
+    return diagnostic.message, source.line_at(diagnostic.span.start)
 
 
 def _description(fix: Fix, source: Source) -> str:

@@ -59,30 +59,49 @@ def _page_rows(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Ro
 def _diagnostic_rows(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
     loud = _SEVERITY_STYLES[diagnostic.severity]
     labels = [Label(diagnostic.span, diagnostic.label), *diagnostic.secondary]
-    numbers = sorted({source.line(label.span.start) for label in labels})
-    width = max(_NARROWEST_GUTTER, len(str(numbers[-1])))
+    width = max(_NARROWEST_GUTTER, *(len(str(source.line(label.span.start))) for label in labels))
     yield [(f"{diagnostic.severity.value}[{diagnostic.code}]", loud), (f": {diagnostic.message}", "bold")]
-    location = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
-    yield [(" " * width + "--> ", _GUTTER_STYLE), (location, "")]
-    yield [(" " * width + " |", _GUTTER_STYLE)]
+    # The file of the first place, then those of the others.
+    arrow = "-->"
+    for file in dict.fromkeys(source.file_number(label.span.start) for label in labels):
+        here = [label for label in labels if source.file_number(label.span.start) == file]
+        start = here[0].span.start
+        location = f"{source.file_path(file)}:{source.line(start)}:{source.column(start)}"
+        yield [(" " * width + f"{arrow} ", _GUTTER_STYLE), (location, "")]
+        yield [(" " * width + " |", _GUTTER_STYLE)]
+        yield from _excerpt_rows(here, source, width, labels[0], loud)
+        arrow = ":::"
+    for head, text in diagnostic.remarks:
+        yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
+
+
+def _excerpt_rows(labels: Sequence[Label], source: Source, width: int, primary: Label, loud: str) -> Iterator[Row]:
+    """Give the lines of one file that labels stand in, with the labels under them.
+
+    Args:
+        labels: all in one file; that of the message itself is the first where it is among them.
+        source: the program.
+        width: of the numbers of lines.
+        primary: the label of the message itself.
+        loud: its style.
+    """
+    numbers = sorted({source.line(label.span.start) for label in labels})
     before = numbers[0]
     for number in numbers:
         if number > before + 1:
             yield [("...", _GUTTER_STYLE)]
         before = number
         line_labels = [label for label in labels if source.line(label.span.start) == number]
-        line = source.line_text(number)
         anchor = labels[0] if labels[0] in line_labels else line_labels[0]
+        line = source.line_at(anchor.span.start)
         first, last = _visible_range(len(line), source.column(anchor.span.start) - 1)
         before_it, behind_it = _ELLIPSIS if first else "", _ELLIPSIS if last < len(line) else ""
         shown = before_it + "".join(_visible_cells(line[first:last])) + behind_it
         yield [(f"{number:>{width}} | ", _GUTTER_STYLE), (shown, "")]
         for label in sorted(line_labels, key=lambda one: one.span.start):
-            mark, style = ("^", loud) if label is labels[0] else ("-", _GUTTER_STYLE)
+            mark, style = ("^", loud) if label is primary else ("-", _GUTTER_STYLE)
             marks = _marker_row(label, mark, style, source, (first, last))
             yield [(" " * width + " | " + " " * len(before_it), _GUTTER_STYLE), *marks]
-    for head, text in diagnostic.remarks:
-        yield [(" " * width + " = ", _GUTTER_STYLE), (f"{head}: ", "bold"), (text, "")]
 
 
 def _visible_range(length: int, column: int) -> tuple[int, int]:
@@ -104,7 +123,7 @@ def _marker_row(label: Label, mark: str, style: str, source: Source, visible: tu
         visible: the first character of the line that is shown, and the one behind the last.
     """
     begin, end = visible
-    line = source.line_text(source.line(label.span.start))
+    line = source.line_at(label.span.start)
     cells = _visible_cells(line[begin:end])
     column = source.column(label.span.start) - 1
     # What lies in a part that is not shown is marked at its edge.

@@ -29,18 +29,18 @@ def _rule(code: str) -> dict[str, Any]:
 
 
 def _result(diagnostic: Diagnostic, source: Source, path: str, codes: list[str]) -> dict[str, Any]:
-    uri = PurePath(path).as_posix()
+    uri = _uri(path, source, diagnostic.span)
     advice = "".join(f"\n{head}: {text}" for head, text in diagnostic.remarks)
     result: dict[str, Any] = {
         "ruleId": diagnostic.code,
         "ruleIndex": codes.index(diagnostic.code),
         "level": diagnostic.severity.value,
         "message": {"text": diagnostic.message + advice},
-        "locations": [_location(diagnostic.span, source, uri, diagnostic.label)],
+        "locations": [_location(diagnostic.span, source, path, diagnostic.label)],
     }
     if diagnostic.secondary:
         result["relatedLocations"] = [
-            {"id": number, **_location(label.span, source, uri, label.text)}
+            {"id": number, **_location(label.span, source, path, label.text)}
             for number, label in enumerate(diagnostic.secondary, 1)
         ]
     if diagnostic.fixes:
@@ -54,8 +54,14 @@ def _result(diagnostic: Diagnostic, source: Source, path: str, codes: list[str])
     return result
 
 
-def _location(span: Span, source: Source, uri: str, text: str) -> dict[str, Any]:
-    physical = {"artifactLocation": {"uri": uri}, "region": _region(span, source)}
+def _uri(path: str, source: Source, span: Span) -> str:
+    """Return the file that a place is in: the program, or a module beside it."""
+    file = source.file_number(span.start)
+    return (PurePath(path).parent / source.modules[file - 1].path if file else PurePath(path)).as_posix()
+
+
+def _location(span: Span, source: Source, path: str, text: str) -> dict[str, Any]:
+    physical = {"artifactLocation": {"uri": _uri(path, source, span)}, "region": _region(span, source)}
     return {"physicalLocation": physical, **({"message": {"text": text}} if text else {})}
 
 
@@ -65,6 +71,6 @@ def _region(span: Span, source: Source) -> dict[str, int]:
         "startColumn": source.column(span.start),
         "endLine": source.line(span.end),
         "endColumn": source.column(span.end),
-        "charOffset": span.start,
+        "charOffset": span.start - source.file_start(span.start),
         "charLength": span.end - span.start,
     }

@@ -54,7 +54,7 @@ def _check_priorities(findings: DiagnosticList, cobegin: tree.Cobegin, source: S
         if first is not branch:
             text = f"{'both' if len(cobegin.branches) == 2 else 'two'} branches have priority {branch.priority.text}"
             note = "frame-table requests of equal priority are served in the order of the text"
-            findings.report("W502", text, branch.head, f"same as line {source.line(first.head.start)}", note=note)
+            findings.report("W502", text, branch.head, f"same as line {source.place(first.head.start)}", note=note)
 
 
 def report_shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
@@ -264,7 +264,7 @@ def _report_cyclic_wait(
     """
     labels = []
     for wait, signal in cycle:
-        labels.append(Label(wait.node.span, f"waits for the SIGNAL in line {source.line(signal.node.span.start)}"))
+        labels.append(Label(wait.node.span, f"waits for the SIGNAL in line {source.place(signal.node.span.start)}"))
         labels.append(Label(signal.node.span, "comes after that WAIT"))
     first, *others = sorted(labels, key=lambda label: label.span.start)
     message = f"these {len(cycle)} branches wait for one another for ever"

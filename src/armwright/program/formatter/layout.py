@@ -132,7 +132,9 @@ class _Layout:
                 self._row(header.body.span.start, 0)
                 self._block(header.body, 0)
         end, _, last = self._pieces[-3:]
-        self._row(self._before(node.statements[0].span.start if node.statements else end.start).start, 0)
+        begin = self._before(node.statements[0].span.start if node.statements else end.start)
+        if begin.word == "BEGIN":
+            self._row(begin.start, 0)
         self._statements(node.statements, INDENT)
         self._row(end.start, 0, comment_indent=INDENT)
         self._row(last.start, 0)

@@ -189,7 +189,7 @@ def counts_text(errors: int, warnings: int) -> str:
 
 
 def to_json(diagnostic: Diagnostic, source: Source) -> dict[str, Any]:
-    """Return a diagnostic as plain data; lines and columns count from 1, offsets from 0."""
+    """Return a diagnostic as plain data; lines and columns count from 1, offsets from 0, each in its file."""
     return {
         "code": diagnostic.code,
         "severity": diagnostic.severity.value,
@@ -203,5 +203,13 @@ def to_json(diagnostic: Diagnostic, source: Source) -> dict[str, Any]:
     }
 
 
-def _position_data(span: Span, source: Source) -> dict[str, int]:
-    return {"line": source.line(span.start), "column": source.column(span.start), "start": span.start, "end": span.end}
+def _position_data(span: Span, source: Source) -> dict[str, Any]:
+    """Return a place; that in a module has the name of its file, and counts from the start of that."""
+    first = source.file_start(span.start)
+    place = {
+        "line": source.line(span.start),
+        "column": source.column(span.start),
+        "start": span.start - first,
+        "end": span.end - first,
+    }
+    return {**place, "file": source.name_at(span.start)} if first else place

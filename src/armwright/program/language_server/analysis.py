@@ -1,26 +1,39 @@
 """All that is known of one version of a program, worked out once; and what stands around a position in a text."""
 
+import re
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 
 import attrs
+from lsprotocol import types as lsp
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.errors import FileFormatError
-from armwright.program.api import Compilation, add_imported_frames, analyse_flow, compile as compile_program
+from armwright.program.api import (
+    Compilation,
+    add_imported_frames,
+    analyse_flow,
+    compile as compile_program,
+    import_reader,
+)
 from armwright.program.flow_analysis.side_effects import walk_statements
+from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
-from armwright.program.language.words import Standard
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.cell_lookup import CellCache
+from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
-from armwright.program.semantics.cell_symbols import ImportedFrames
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, is_module
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
+
+_QUALIFIER = re.compile(r"(?<![\w.])([A-Za-z]\w*)\.(?:[A-Za-z]\w*\.)*\Z")
+_LONGEST_QUALIFIER = 100
 
 
 @attrs.frozen(kw_only=True)
@@ -48,6 +61,7 @@ class Analysis:
         cell: what it acts on, with what it imports; None where that is not known.
         declaration_lines: where frames and arms are declared, by name: the URI of the file, and the line from 1.
         cell_error: why the cell of the settings cannot be read; empty if it can.
+        folder: of the program; None for a text without a file.
     """
 
     compiled: Compilation
@@ -55,6 +69,7 @@ class Analysis:
     cell: Cell | None = None
     declaration_lines: Mapping[str, tuple[str, int]] = attrs.field(factory=dict)
     cell_error: str = ""
+    folder: Path | None = None
 
     @cached_property
     def complete(self) -> Compilation:
@@ -64,7 +79,33 @@ class Analysis:
     @property
     def text(self) -> str:
         """The text of the program."""
-        return self.compiled.source.text
+        return self.codec.text
+
+    @cached_property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """The diagnostics of the program's own file."""
+        source = self.compiled.source
+        return tuple(one for one in self.complete.diagnostics if not source.file_number(one.span.start))
+
+    @cached_property
+    def module_diagnostics(self) -> dict[str, list[Diagnostic]]:
+        """The diagnostics of modules, by their paths beside the program."""
+        source = self.compiled.source
+        found: dict[str, list[Diagnostic]] = {}
+        for one in self.complete.diagnostics:
+            if file := source.file_number(one.span.start):
+                found.setdefault(source.modules[file - 1].path, []).append(one)
+        return found
+
+    def location(self, uri: str, span: Span) -> lsp.Location:
+        """Return where a span is: in the document with this URI, or in the file of a module."""
+        source = self.compiled.source
+        file = source.file_number(span.start)
+        if not file or self.folder is None:
+            return lsp.Location(uri, span_range(self.codec, span))
+        codec = PositionCodec(source.file_text(file), self.codec.encoding)
+        path = self.folder / source.modules[file - 1].path
+        return lsp.Location(path.absolute().as_uri(), span_range(codec, span.moved(-source.modules[file - 1].start)))
 
     @cached_property
     def frames(self) -> FrameTree | None:
@@ -74,7 +115,7 @@ class Analysis:
     @cached_property
     def scopes(self) -> ScopeExtents:
         """The names that are visible in each range of the text."""
-        return scope_extents(self.compiled.symbols)
+        return scope_extents(self.compiled.symbols, self.compiled.brought)
 
     @cached_property
     def occurrences(self) -> tuple[Occurrence, ...]:
@@ -146,8 +187,10 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCac
         problem = str(error)
     imports: list[Path] = []
 
-    def read_import(path: str) -> ImportedFrames:
+    def read_import(path: str) -> ImportedFrames | ImportedModule:
         assert folder is not None  # noqa: S101 - imports are read only with a folder
+        if is_module(path):
+            return import_reader(folder)(path)
         imported = cells.read_import(folder, path)
         imports.append(folder / path)
         return imported
@@ -165,7 +208,9 @@ def analyse(name: str, codec: PositionCodec, folder: Path | None, cells: CellCac
     # Where nothing has arms, an imported file still has frames.
     imported = (imported.cell for imported in compiled.imports)
     cell = compiled.cell or add_imported_frames(next(filter(None, imported), None), compiled.imports)
-    return Analysis(compiled=compiled, codec=codec, cell=cell, declaration_lines=lines, cell_error=problem)
+    return Analysis(
+        compiled=compiled, codec=codec, cell=cell, declaration_lines=lines, cell_error=problem, folder=folder
+    )
 
 
 @attrs.frozen(kw_only=True)
@@ -194,6 +239,10 @@ def lexical_context(text: str, offset: int, std: Standard) -> LexicalContext | N
     start = offset
     while start and (text[start - 1].isalnum() or text[start - 1] in "_-"):
         start -= 1
+    # What stands in front of a point names the part of something, unless it is END or a number.
+    if (qualifier := _QUALIFIER.search(text[max(0, start - _LONGEST_QUALIFIER) : start])) and std is Standard.RLO_2:
+        is_name = qualifier[1].upper() not in VOCABULARIES[std].reserved
+        start -= len(qualifier[0]) if is_name else 0
     # A sign in it belongs to an arm or to nothing.
     before_sign, sign, _ = text[start:offset].upper().rpartition("-")
     word = Span(start + len(before_sign + sign) if before_sign != "ARM" else start, offset)

@@ -37,7 +37,7 @@ def code_actions(
     actions = []
     if _is_requested(lsp.CodeActionKind.QuickFix.value, context):
         actions += quick_fixes(analysis, uri, range_, context.diagnostics)
-    certain = all_fixes(analysis.complete.diagnostics)
+    certain = all_fixes(analysis.diagnostics)
     if certain and _is_requested(FIX_ALL, context):
         edit = _workspace_edit(analysis, uri, certain)
         actions.append(lsp.CodeAction("apply all certain fixes", kind=FIX_ALL, edit=edit))
@@ -55,7 +55,7 @@ def quick_fixes(
     """Return the fixes of the diagnostics in a range of text: certain ones, and corrections of misspelt names."""
     source, span = analysis.compiled.source, span_of(analysis.codec, range_)
     actions = []
-    for diagnostic in analysis.complete.diagnostics:
+    for diagnostic in analysis.diagnostics:
         cured = _with_suggested_word(diagnostic, source)
         parts = (cured.span, *(fix.span for fix in cured.fixes)) if cured.fixes else ()
         if not any(start <= span.end and span.start <= end for start, end in parts):

@@ -35,6 +35,7 @@ from armwright.program.semantics.expression_types import ACCEPTED_TYPES, Express
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
 from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.nodes import Name
 from armwright.program.syntax.parser import expected_tokens
 
 # Whole statements; ``${1:name}`` are the parts to fill in, in order.
@@ -52,6 +53,7 @@ _SNIPPETS = {
     "TRY": (("TRY ... RECOVER", "TRY\n  $1\nRECOVER\n  $0\nEND ;"),),
     "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
+    "MODULE": (("MODULE ...", "MODULE ${1:name} ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
     "FUNCTION": (("FUNCTION ...", "FUNCTION ${1:name} (${2:n : SCALAR}) : SCALAR ;\nBEGIN\n  RETURN $0\nEND ;"),),
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
@@ -304,12 +306,24 @@ class _ItemFactory:
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
             declared = self._scope.declared(key)
-            name = declared.text if declared else self._match_case(key)
+            name = self._written(key, declared) if declared else self._match_case(key)
+            if not name:
+                continue
             origin = "" if declared else "predeclared" if key in PREDECLARED else "imported"
             origin = f"of {local.node.name.text}" if local is not None and key in local_types else origin
             text = f"{name}[${{1:1}}]" if kind.sizes else name
             item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {origin}".rstrip()
             yield self._item(name, item, text, detail, self._parent(key, kind))
+
+    def _written(self, key: str, declared: Name) -> str:
+        """Return how the program may write a name; empty for one of a module that it does not see."""
+        compiled = self._analysis.compiled
+        if self._scope.is_local(key) or not compiled.source.file_number(declared.span.start):
+            return declared.text
+        written = [name for name, meant in compiled.brought.items() if meant == key]
+        if not written or any("." not in name for name in written):
+            return declared.text if written else ""
+        return f"{written[0].partition('.')[0].lower()}.{declared.text}"
 
     def _parent(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
@@ -351,15 +365,15 @@ class _ItemFactory:
     def own_functions(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the functions of the program that have a value of the right kind."""
         for procedure in self._scope.symbols.procedures.values():
-            if procedure.result is not None and procedure.result.kind in operand.kinds:
-                name = procedure.node.name.text
+            name = self._written(procedure.node.name.key, procedure.node.name)
+            if name and procedure.result is not None and procedure.result.kind in operand.kinds:
                 yield self._item(name, Kind.Function, f"{name}($1)", signature(procedure.node)[0])
 
     def procedures(self) -> Iterator[CompletionItem]:
         """Give the procedures of the program."""
         for procedure in self._scope.symbols.procedures.values():
-            if procedure.is_function:
+            name = self._written(procedure.node.name.key, procedure.node.name)
+            if procedure.is_function or not name:
                 continue
-            name = procedure.node.name.text
             text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
             yield self._item(name, Kind.Function, text, signature(procedure.node)[0])

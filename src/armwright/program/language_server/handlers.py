@@ -68,7 +68,7 @@ async def _on_definition(server: RloServer, params: lsp.DefinitionParams) -> lsp
         return None
     declared = analysis.declaration(occurrence)
     if declared is not None:
-        return lsp.Location(params.text_document.uri, span_range(analysis.codec, declared.span))
+        return analysis.location(params.text_document.uri, declared.span)
     if occurrence.key not in analysis.declaration_lines:
         return None
     uri, line = analysis.declaration_lines[occurrence.key]

@@ -102,7 +102,7 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.ARM:
             description = f"{key} : FRAME", _describe_arm(analysis, key)
         case NameKind.PROCEDURE if procedure is not None:
-            line = analysis.compiled.source.line(procedure.node.name.span.start)
+            line = analysis.compiled.source.place(procedure.node.name.span.start)
             description = signature(procedure.node)[0], [f"declared in line {line}"]
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
@@ -125,7 +125,7 @@ def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) ->
     code = f"{declared.text if declared else text} : {occurrence.type or 'of an invalid type'}"
     lines = []
     if declared is not None:
-        origin = f"declared in line {analysis.compiled.source.line(declared.span.start)}"
+        origin = f"declared in line {analysis.compiled.source.place(declared.span.start)}"
         if occurrence.owner is not None:
             procedure = symbols.procedures[occurrence.owner]
             role = "parameter" if occurrence.key in procedure.parameters else "variable"

@@ -65,7 +65,8 @@ def _move_hints(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
 
 
 def _call_hints(analysis: Analysis, call: tree.Call) -> Iterator[lsp.InlayHint]:
-    procedure = analysis.compiled.symbols.procedures.get(call.name.key)
+    key = call.name.key
+    procedure = analysis.compiled.symbols.procedures.get(analysis.compiled.brought.get(key, key))
     if procedure is None:
         return
     names = (name for declaration in procedure.node.parameters for name in declaration.names)

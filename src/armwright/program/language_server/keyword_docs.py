@@ -30,7 +30,12 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     # in front of BEGIN
     "VAR": ("VAR name, name : TYPE ;", "Declares variables: SCALAR, TRANS, FRAME or EVENT, single or in an ARRAY."),
     "UNITS": ("UNITS MM, DEG ;", "Sets the units of bare lengths and angles; the default is metres and degrees."),
-    "IMPORT": ('IMPORT "file" ;', "Imports the frames of a cell file, and its arms if no other cell is specified."),
+    "MODULE": ("MODULE name ;", "Makes a module of this file, whose names other programs can IMPORT."),
+    "IMPORT": (
+        'IMPORT "file" [AS name] ;',
+        "Imports the names of a module, or the frames of a cell file, and its arms if no other cell is specified.",
+    ),
+    "AS": ('IMPORT "file.rlo" AS name ;', "The names of the module are written `name.x` in this file."),
     "PROCEDURE": (
         "PROCEDURE name (a, b : TYPE, c : TYPE) ; [VAR ...] BEGIN ... END ;",
         "Declares a procedure: SCALAR and TRANS are passed by value; FRAME, EVENT and arrays by reference.",

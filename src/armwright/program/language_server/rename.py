@@ -37,7 +37,10 @@ def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
     text = analysis.text[occurrence.start : occurrence.end]
     if occurrence.kind in _NOT_RENAMEABLE:
         raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]} and cannot be renamed")
-    undeclared = occurrence.kind is NameKind.UNKNOWN or analysis.declaration(occurrence) is None
+    declared, source = analysis.declaration(occurrence), analysis.compiled.source
+    if declared is not None and (file := source.file_number(declared.span.start)):
+        raise InvalidValueError(f"`{text}` is declared in {source.file_path(file)} and cannot be renamed here")
+    undeclared = occurrence.kind is NameKind.UNKNOWN or declared is None
     if undeclared or (occurrence.kind is NameKind.VARIABLE and occurrence.owner is None):
         if occurrence.key in analysis.compiled.symbols.imported:
             raise InvalidValueError(f"`{text}` is imported and cannot be renamed here")
@@ -45,9 +48,9 @@ def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
             raise InvalidValueError(f"`{text}` is predeclared and cannot be renamed")
         if undeclared:
             raise InvalidValueError(f"`{text}` is not declared and cannot be renamed")
-        source = _cell_source(analysis, occurrence.key)
-        if source is not None:
-            raise InvalidValueError(f"`{text}` {source} by this name; rename it there first")
+        origin = _cell_source(analysis, occurrence.key)
+        if origin is not None:
+            raise InvalidValueError(f"`{text}` {origin} by this name; rename it there first")
     return occurrence
 
 

@@ -199,7 +199,7 @@ class RloServer(LanguageServer):
 
     async def register_watchers(self) -> None:
         """Ask the editor for notifications of changes of cell files and of settings."""
-        watched = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher("**/*.{toml,json}")])
+        watched = lsp.DidChangeWatchedFilesRegistrationOptions([lsp.FileSystemWatcher("**/*.{toml,json,rlo}")])
         options = {
             "did_change_watched_files": (lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, watched),
             "did_change_configuration": (

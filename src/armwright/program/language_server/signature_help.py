@@ -44,7 +44,8 @@ def signature_help(text: str, analysis: Analysis, offset: int) -> lsp.SignatureH
     if call is None:
         return None
     name, argument = call
-    procedure, meaning = analysis.compiled.symbols.procedures.get(name.key), None
+    key = analysis.compiled.brought.get(name.key, name.key)
+    procedure, meaning = analysis.compiled.symbols.procedures.get(key), None
     if procedure is not None:
         label, parameters = signature(procedure.node)
     elif name.key in FUNCTIONS and (word := word_doc(name.key)) is not None:

@@ -2,7 +2,7 @@
 
 import enum
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 
@@ -78,24 +78,31 @@ class ScopeExtents:
     Attributes:
         starts: where each range starts, in order; it ends where the next one starts.
         scopes: the names that are visible in each.
+        brought: the names that modules give, as the text writes them, with their keys.
     """
 
     starts: Sequence[int]
     scopes: Sequence[Scope]
+    brought: Mapping[str, str] = attrs.field(factory=dict)
 
     def scope_at(self, offset: int) -> Scope:
         """Return the names that are visible at a position."""
         return self.scopes[bisect_right(self.starts, offset) - 1]
 
 
-def scope_extents(symbols: Symbols) -> ScopeExtents:
-    """Return the ranges of a program in which the same names are visible: procedures, and the text between them."""
+def scope_extents(symbols: Symbols, brought: Mapping[str, str]) -> ScopeExtents:
+    """Return the ranges of a program in which the same names are visible: procedures, and the text between them.
+
+    Args:
+        symbols: all names.
+        brought: those that modules give, as the text writes them, with their keys.
+    """
     main = symbols.scope(None)
     starts, scopes = [0], [main]
     for key, procedure in sorted(symbols.procedures.items(), key=lambda item: item[1].node.span.start):
         starts += procedure.node.span
         scopes += [symbols.scope(key), main]
-    return ScopeExtents(starts, scopes)
+    return ScopeExtents(starts, scopes, brought)
 
 
 def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurrence, ...]:
@@ -115,7 +122,9 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
             if kind is _ARM:
                 name = Occurrence(token.start, token.end, key, NameKind.ARM)
             else:
-                name = _classify_name(token, scopes.scope_at(token.start), previous, next_key, in_units=in_units)
+                scope = scopes.scope_at(token.start)
+                meant = key if scope.is_local(key) else scopes.brought.get(key, key)
+                name = _classify_name(token, meant, scope, previous, next_key, in_units=in_units)
             result.append(name)
             if previous == "RAISE" or (in_recover and previous in ("(", ",")):
                 name.kind, name.owner, name.type, name.declares = NameKind.ERROR, None, None, False
@@ -135,9 +144,9 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
     return tuple(result)
 
 
-def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, in_units: bool) -> Occurrence:
-    """Return what a name is between the tokens around it."""
-    key, start, end = token.key, token.start, token.end
+def _classify_name(token: Token, key: str, scope: Scope, previous: str, next_key: str, *, in_units: bool) -> Occurrence:
+    """Return what a name, known by its key, is between the tokens around it."""
+    start, end = token.start, token.end
     procedures = scope.symbols.procedures
     is_called = next_key == "(" and not scope.is_local(key)
     if previous in ("PROCEDURE", "FUNCTION") or (is_called and key in procedures):
@@ -153,12 +162,12 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
         return Occurrence(start, end, key, NameKind.DEVICE)
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)
-    return _classify_variable(token, scope)
+    return _classify_variable(token, key, scope)
 
 
-def _classify_variable(token: Token, scope: Scope) -> Occurrence:
-    """Return which variable a name is, if it is one."""
-    key, symbols, local = token.key, scope.symbols, scope.procedure
+def _classify_variable(token: Token, key: str, scope: Scope) -> Occurrence:
+    """Return which variable a name, known by its key, is, if it is one."""
+    symbols, local = scope.symbols, scope.procedure
     names, owner = (local, local.node.name.key) if local is not None and key in local.types else (symbols, None)
     kind, declared = names.types.get(key), names.declared.get(key)
     if owner is None and kind is None and declared is None:

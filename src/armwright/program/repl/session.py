@@ -27,7 +27,7 @@ from armwright.program.repl.input import ParsedInput, parse_input, shift_diagnos
 from armwright.program.repl.session_text import header_title, program_text
 from armwright.program.repl.undo_report import undone_lines
 from armwright.program.semantics import check
-from armwright.program.semantics.cell_symbols import ReadImport, known_cell
+from armwright.program.semantics.cell_symbols import ImportedFrames, ReadImport, known_cell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 from armwright.program.vm.machine import Limits, Machine, RunError
@@ -354,7 +354,8 @@ class Session:
         snapshots.rename_variables(machine, heading.new_names)
         snapshots.remove_unused(machine, heading.unused_names)
         for header in heading.imports:
-            imported = None if self._read_import is None else self._read_import(header.path.value).cell
+            brought = None if self._read_import is None else self._read_import(header.path.value)
+            imported = brought.cell if isinstance(brought, ImportedFrames) else None
             if imported is not None:
                 snapshots.import_frames(machine, imported.frames, header.span)
         machine = snapshots.load_code(machine, checked.code(), self.limits)

@@ -9,6 +9,8 @@ from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
 
 STATION = "STATION"
+# Suffix of the files of programs and modules.
+MODULE_SUFFIX = ".rlo"
 
 
 @attrs.frozen(kw_only=True)
@@ -47,8 +49,24 @@ class ImportedFrames:
     cell: Cell | None = None
 
 
+@attrs.frozen(kw_only=True)
+class ImportedModule:
+    """The module of an IMPORT.
+
+    Attributes:
+        text: of its file.
+    """
+
+    text: str
+
+
+def is_module(path: str) -> bool:
+    """Whether an IMPORT of this file brings a module, and not the frames of a cell."""
+    return path.lower().endswith(MODULE_SUFFIX)
+
+
 # Reads the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
-ReadImport: TypeAlias = Callable[[str], ImportedFrames]
+ReadImport: TypeAlias = Callable[[str], ImportedFrames | ImportedModule]
 
 
 def known_cell(cell: Cell) -> KnownCell:
@@ -65,4 +83,4 @@ def known_cell(cell: Cell) -> KnownCell:
     )
 
 
-__all__ = ["STATION", "WORLD", "ImportedFrames", "KnownCell", "ReadImport", "known_cell"]
+__all__ = ["STATION", "WORLD", "ImportedFrames", "ImportedModule", "KnownCell", "ReadImport", "is_module", "known_cell"]

@@ -1,5 +1,7 @@
 """Names and types: every name declared once and used as what it is; clauses that go together; values in range."""
 
+from collections.abc import Collection
+
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
 from armwright.program.semantics import control_flow, devices, frames, functions, headers, move, output
@@ -21,6 +23,8 @@ def check(
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
     arguments: Arguments | None = None,
+    exported: Collection[str] = (),
+    has_unknown_names: bool = False,
 ) -> tuple[Symbols, list[Diagnostic], tuple[ImportedFrames, ...]]:
     """Check names, types, clauses and values.
 
@@ -31,6 +35,8 @@ def check(
         read_import: gives what the file of an IMPORT holds, and raises an ArmwrightError when it cannot be read;
             without it nothing is looked up.
         arguments: values for constants of the program, in place of their own.
+        exported: names that other programs may use, of modules.
+        has_unknown_names: whether any name may be that of a module that could not be read.
 
     Returns:
         The names of the program, what is wrong, and what was imported.
@@ -40,6 +46,7 @@ def check(
         InvalidValueError: an argument is not of the type of its constant.
     """
     names = NameResolver(cell, std)
+    names.symbols.open_import = has_unknown_names
     procedures = headers.declare(names, program, read_import, arguments or {})
     calls = CallChecker(names)
     for procedure in procedures:
@@ -50,5 +57,5 @@ def check(
     Context(CHECKS, names, calls).check(*program.statements)
     calls.report_fixed_arguments()
     control_flow.report_unknown_kinds(names)
-    names.report_unused()
+    names.report_unused(exported)
     return names.symbols, names.diagnostics, tuple(names.imports)

@@ -9,7 +9,7 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.arguments import Arguments, argument_values
 from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_NAME
-from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
+from armwright.program.semantics.cell_symbols import STATION, WORLD, ImportedFrames, ReadImport, is_module
 from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
@@ -180,6 +180,14 @@ def _report_unknown_unit(names: NameResolver, unit: tree.Name) -> None:
 
 def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadImport | None) -> None:
     path = header.path
+    if is_module(path.value):
+        names.symbols.open_import = True
+        text = f"`{path.value}` is a module, and only the file of a program can import it"
+        names.report("E228", text, path.span, "not read", advice="write a program in a file of its own")
+        return
+    if header.alias is not None:
+        text = f"`{path.value}` is no module, and its frames have their own names"
+        names.report("E250", text, header.alias.span, "no name is needed", advice="leave AS and the name out")
     if read_import is None:
         names.symbols.open_import = True
         note = "a name that is not declared may be one of them"
@@ -188,6 +196,7 @@ def _declare_import(names: NameResolver, header: tree.Import, read_import: ReadI
         return
     try:
         brought = read_import(path.value)
+        assert isinstance(brought, ImportedFrames)  # noqa: S101 - it is no module
     except ArmwrightError as error:
         # What the file would have brought is unknown, so nothing is asked of unknown names.
         names.symbols.open_import = True

@@ -141,18 +141,18 @@ class NameResolver:
 
     # ---- at the end ------------------------------------------------------------------------------------------------
 
-    def report_unused(self) -> None:
-        """Report names that are declared and never used."""
-        self._report_unused_names(self.symbols)
+    def report_unused(self, exported: Collection[str] = ()) -> None:
+        """Report names that are declared and never used, and that no other program may use."""
+        self._report_unused_names(self.symbols, exported)
         for key, procedure in self.symbols.procedures.items():
             name = procedure.node.name
-            if key not in self._called:
+            if key not in self._called and key not in exported:
                 self.report("L304", f"procedure `{name.text}` is never called", name.span, "declared here")
             self._report_unused_names(procedure)
 
-    def _report_unused_names(self, table: SymbolTable) -> None:
+    def _report_unused_names(self, table: SymbolTable, exported: Collection[str] = ()) -> None:
         for key, name in table.declared.items():
-            if key not in table.used and table.types[key] is not None:
+            if key not in table.used and key not in exported and table.types[key] is not None:
                 self.report("L304", f"`{name.text}` is never used", name.span, "declared here")
 
     def _declaring_procedure(self, key: str) -> ProcedureSymbols | None:

@@ -378,7 +378,9 @@ def _error_kind(tokens: TokenStream, wants: str, where: str) -> tree.Name | tree
     tokens.note_expected_operand(wants, where)
     if tokens.current.kind is TokenKind.NAME:
         tokens.height = 1
-        return tokens.take_name()
+        kind = tokens.take_name()
+        tokens.check_name_length(kind)
+        return kind
     return tokens.fail(f"expected {wants} {where or f'after `{tokens.previous.text}`'}")
 
 

@@ -99,7 +99,7 @@ def _skip_nonsense(tokens: TokenStream) -> tree.Declaration:
 
 
 def _accept_begin(tokens: TokenStream) -> None:
-    if tokens.accept("BEGIN") or tokens.is_at_end:
+    if tokens.accept("BEGIN") or tokens.is_at_end or (tokens.in_module and tokens.matches("END")):
         return
     if tokens.current.kind is TokenKind.NAME and tokens.peek().key != "=" and closest(tokens.current.text, ["BEGIN"]):
         _replace_misspelt_keyword(tokens, "BEGIN")
@@ -128,13 +128,34 @@ def _constants(tokens: TokenStream) -> list[tree.Header]:
     return constants
 
 
-# import = "IMPORT" string ";" ;
+# module = "MODULE" name ";" ;
+def _module(tokens: TokenStream) -> list[tree.Header]:
+    start = tokens.current
+    if tokens.index:
+        text = "MODULE stands in front of everything else"
+        tokens.report_once("E250", text, start.span, "too late here", advice="make it the first line of the file")
+    tokens.accept_word("MODULE")
+    name = tokens.take_name()
+    tokens.check_name_length(name)
+    tokens.in_module = True
+    node = tokens.node(tree.Module, start, name)
+    tokens.accept_semicolon("after the name of the module")
+    return [node]
+
+
+# import = "IMPORT" string [ "AS" name ] ";" ;
 def _import(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
     token = tokens.current
     if token.kind is not TokenKind.STRING:
         tokens.fail("expected the name of a file after IMPORT", advice='write `IMPORT "cell.json" ;`')
-    node = tokens.node(tree.Import, start, tree.String(tokens.take().span, token.text[1:-1]))
+    path, alias = tree.String(tokens.take().span, token.text[1:-1]), None
+    if tokens.accept_word("AS"):
+        if tokens.current.kind is not TokenKind.NAME:
+            tokens.fail("expected a name after AS", advice='write `IMPORT "gripping.rlo" AS grip ;`')
+        alias = tokens.take_name()
+        tokens.check_name_length(alias)
+    node = tokens.node(tree.Import, start, path, alias)
     tokens.accept_semicolon("after the import")
     return [node]
 
@@ -323,6 +344,7 @@ def late_header(tokens: TokenStream) -> tree.Statement:
 
 _HEADERS: Mapping[str, Callable[[TokenStream], Sequence[tree.Header]]] = {
     "VAR": var_part,
+    "MODULE": _module,
     "CONST": _constants,
     "FUNCTION": _procedure,
     "IMPORT": _import,

@@ -80,7 +80,7 @@ _UNIT = "(?:" + "|".join("".join(f"[{letter}{letter.lower()}]" for letter in uni
 _PATTERN = re.compile(
     rf"""
     [{_BLANKS}]*+ (?:
-      ( [^\W\d_] \w* )                                                              # a word
+      ( [^\W\d_] \w* (?: \.[^\W\d_] \w* )* )                                        # a word, or several with points
     | ( := | <= | >= | <> | == | != | && | \|\| | =< | => | [;,)=:\[\]+*<>-] | \.(?![0-9]) | \((?!\*) | /(?![/*]) )
     | ( {_DIGITS} {_UNIT}? (?![\w.]) )
     | ( \{{ [^}}]*+ \}} | //[^\r\n]* )                                              # a comment
@@ -134,15 +134,16 @@ _MEANINGLESS = re.compile(
 _FOREIGN_COMMENT = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
 
 
-def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> ScannedText:
+def scan(source: Source, text: str, standard: Standard = Standard.RLO_2, first: int = 0) -> ScannedText:
     """Cut a text into tokens.
 
     Args:
         source: the program as written.
         text: the same, as long, with line numbers blanked out.
         standard: which words are reserved.
+        first: the character to begin at.
     """
-    return _Scanner(source, text, standard).scan()
+    return _Scanner(source, text, standard).scan(first)
 
 
 class _Scanner:
@@ -153,7 +154,7 @@ class _Scanner:
         self._text = text if text.isascii() else text.translate(CONFUSABLES)
         # A look-alike inside a comment is nobody's business, so they are looked for token by token.
         self._has_confusables = not text.isascii()
-        self._reserved = VOCABULARIES[standard].reserved
+        self._standard, self._reserved = standard, VOCABULARIES[standard].reserved
         self._max_tokens = limit("words")
         self._unclosed = False
         # Most words of a program stand there more than once: what they are is found out the first time.
@@ -169,9 +170,9 @@ class _Scanner:
         self._stray_ends: dict[int, int] = {}
         self._reported_names: set[str] = set()
 
-    def scan(self) -> ScannedText:
+    def scan(self, position: int) -> ScannedText:
         # Blanks at the end would be tried in vain from each of them.
-        position, last = 0, len(self._text.rstrip(_BLANKS))
+        last = len(self._text.rstrip(_BLANKS))
         while position < last:
             position = self._scan_tokens(position, last)
         end = len(self._text)
@@ -241,6 +242,8 @@ class _Scanner:
                 return Token(TokenKind.ARM, match[0], arm_name(match[1]), start, match.end())
             if match := _MISSPELT_ARM.match(self._text, start):
                 return self._scan_misspelt_arm(match[0], start, match.end())
+        if "." in word and not self._is_qualified(key):
+            return self._scan_word(word[: word.index(".")], start, start + word.index("."))
         if word.isascii():
             return Token(TokenKind.KEYWORD if key in self._reserved else TokenKind.NAME, word, key, start, end)
         if key not in self._reported_names:
@@ -249,6 +252,10 @@ class _Scanner:
             label = "names are made of the letters A to Z, digits and `_`"
             self._report("E101", f"a name cannot contain `{foreign}`", Span(start, end), label)
         return Token(TokenKind.NAME, word, key, start, end, damaged=True)
+
+    def _is_qualified(self, key: str) -> bool:
+        """Whether words with points between them are one name; behind a keyword the point ends the program."""
+        return self._standard is Standard.RLO_2 and key.partition(".")[0] not in self._reserved
 
     def _scan_number(self, word: str, start: int, end: int, *, malformed: bool) -> Token:
         match = _WITH_UNIT.fullmatch(word)

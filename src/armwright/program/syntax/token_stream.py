@@ -55,6 +55,7 @@ class TokenStream:
         procedures: the names of the procedures read so far.
         reported_missing: the words whose absence has been reported.
         enclosing_procedure: the key of the procedure that the position lies in; empty outside of all.
+        in_module: whether the program is a module, which needs no BEGIN.
         in_function: whether the position lies in the statements of a FUNCTION.
         recover_depth: how many TRYs the position lies in the second part of.
         assignment_target: the key of the variable that the statement gives a value; empty where it gives none.
@@ -86,7 +87,7 @@ class TokenStream:
         self.reported_missing: set[str] = set()
         self.enclosing_procedure = self.assignment_target = ""
         self.recover_depth = 0
-        self.in_function = False
+        self.in_module = self.in_function = False
         self.operand_context = ANY_VALUE
         self.expected: ExpectedTokens | None = None
         # How much was wrong in front of the last token; what is looked for after a mistake there is guessed.
@@ -397,7 +398,11 @@ class TokenStream:
         return after.kind in (_NAME, TokenKind.ARM) and self.is_on_same_line()
 
     def check_name_length(self, name: tree.Name) -> None:
-        """Refuse a name that is too long."""
+        """Refuse a declared name that is too long, or has a point in it."""
+        if "." in name.text:
+            label = "names are made of the letters A to Z, digits and `_`"
+            self.report("E101", "a name cannot contain `.`", name.span, label)
+            return
         longest = self.standard_vocabulary.longest_name
         if len(name.text) > longest:
             text = f"the name `{name.text}` is longer than {longest} characters"

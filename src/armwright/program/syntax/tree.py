@@ -443,10 +443,18 @@ class Constant(Node):
 
 
 @attrs.frozen
+class Module(Node):
+    """``MODULE name``, the first line of a module."""
+
+    name: Name
+
+
+@attrs.frozen
 class Import(Node):
-    """``IMPORT "file"``."""
+    """``IMPORT "file" [AS name]``; behind AS stands what a module is called in this file."""
 
     path: String
+    alias: Name | None = None
 
 
 @attrs.frozen
@@ -471,7 +479,7 @@ class Procedure(Node):
     result: TypeName | None = None
 
 
-Header: TypeAlias = Declaration | Constant | Import | Units | Procedure
+Header: TypeAlias = Module | Declaration | Constant | Import | Units | Procedure
 
 
 @attrs.frozen
@@ -488,6 +496,16 @@ class Program(Node):
     headers: tuple[Header, ...]
     statements: tuple[Statement, ...]
     end: Span
+
+    @property
+    def module(self) -> Module | None:
+        """The line that makes a module of the program; None where it is none."""
+        return next((header for header in self.headers if isinstance(header, Module)), None)
+
+    @property
+    def imports(self) -> tuple[Import, ...]:
+        """The imports."""
+        return tuple(header for header in self.headers if isinstance(header, Import))
 
     @property
     def declarations(self) -> tuple[Declaration, ...]:

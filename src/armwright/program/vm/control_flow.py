@@ -209,7 +209,7 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         if (try_block := _unwind_to_recovery(machine, process, span, error.kind)) is not None:
             process.pc, process.message = try_block.recovery, error.diagnostic.message
             release_locks(machine, process, try_block.lock_count)
-            code, line = error.diagnostic.code, machine.code.source.line(span.start)
+            code, line = error.diagnostic.code, machine.code.source.place(span.start)
             text = f"{code} in line {line}: {error.diagnostic.message}"
             machine.record_effect(process, "ERROR", text, span, data={"code": code, "kind": error.kind})
             return True

@@ -52,7 +52,7 @@ def interpret(
         code: of a program without errors.
         cell: arms, frames, servo period and deviation.
         hardware: the cell at work, simulated or real.
-        progress: told before each statement.
+        progress: told before each statement of the program's own file.
         limits: when a program is taken to run for ever.
 
     Returns:
@@ -76,11 +76,11 @@ def run(machine: Machine, progress: Progress | None = None) -> None:
     Raises:
         RunError: as ``interpret`` does.
     """
-    instructions = machine.code.instructions
+    instructions, source = machine.code.instructions, machine.code.source
     while not machine.state.has_ended:
         process = next_process(machine)
-        if progress and instructions[process.pc].begins:
-            progress(machine.now, machine.code.line(instructions[process.pc]))
+        if progress and (step := instructions[process.pc]).begins and not source.file_number(step.span.start):
+            progress(machine.now, source.line(step.span.start))
         advance(machine, process)
 
 
@@ -208,7 +208,7 @@ def _stopped_error(machine: Machine, error: RunError, process: Process, arm: str
 def _failure_recording(machine: Machine, failure: Failure, switched_off: Sequence[str]) -> Recording:
     """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
     fault, recording = failure.diagnostic, machine.recording()
-    line = machine.code.source.line(fault.span.start)
+    line = machine.code.source.place(fault.span.start)
     text = f"{fault.code} in line {line}: {fault.message}{switched_off_text(machine, switched_off)}"
     data = {"code": fault.code, "failed_at": failure.time, "switched_off": list(switched_off)}
     end = Effect(
