@@ -21,6 +21,9 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
     "WITHIN": ("WITHIN", "within"),
+    "WHEN": ("WHEN", "when"),
+    "BRAKE": ("BRAKE", "brake"),
+    "RESUME": ("RESUME", "resume"),
     "LOG": ("LOG", "log"),
     "RETURN": ("RETURN", "return"),
 }

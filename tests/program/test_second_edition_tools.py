@@ -36,6 +36,8 @@ BEGIN
   ok = n > 40 ;
   note = TEXT("n", n) ;
   TRY RAISE jam WITH note RECOVER (jam) PRINT(MESSAGE) END ;
+  WHEN stop : n < 0 DO BRAKE ;
+  WHEN stop OFF ;
   PRINT(n)
 END.
 """
@@ -147,6 +149,7 @@ procedure Add(inout n : scalar, in k: scalar); begin n = n+k end;
 begin log = twice(1); TEXT = log ; return[1] = true; log "a"(text, LOG); add(log, 2) ; s = text("x", log);
 wait until return[1] within 2 else begin print(1); halt end;
 try pulse lamp for 200ms; raise jam with s recover(jam, timeout) operate valve to 2 end;
+when Log : priority 2 : (text > 1) and input(door) do begin brake; when log off; resume end; when text=3 do text=4;
 wait until input(door) and text > 1
 end."""
 
@@ -183,6 +186,14 @@ BEGIN
   RECOVER (jam, timeout)
     OPERATE valve TO 2
   END ;
+  WHEN Log : PRIORITY 2 : (text > 1) AND INPUT(door) DO
+  BEGIN
+    BRAKE ;
+    WHEN log OFF ;
+    RESUME
+  END ;
+  WHEN text = 3 DO
+    text = 4 ;
   WAIT UNTIL INPUT(door) AND text > 1
 END.
 """
@@ -217,6 +228,10 @@ def shown_at(word: str, text: str = PROGRAM) -> str:
         ("jam)", "a kind of error of the program"),
         ("MESSAGE", "recovered from last"),
         ("BOOLEAN", "A condition"),
+        ("WHEN", "comes true on a servo tick"),
+        ("stop :", "the name of a WHEN"),
+        ("BRAKE", "stops the MOVE that it interrupts"),
+        ("OFF", "Disarms a WHEN"),
     ],
 )
 def test_hover(word: str, says: str) -> None:
@@ -237,7 +252,10 @@ def offered(written: str) -> list[str]:
         ("n = ", {"n", "pitch", "twice", "SQRT", "TIME", "ANALOG"}),
         ("ok = ", {"ok", "TRUE", "NOT", "INPUT"}),
         ("note = ", {"note", "TEXT", "MESSAGE"}),
-        ("", {"LOG", "PULSE", "RAISE", "WAIT"}),
+        ("", {"LOG", "PULSE", "RAISE", "WAIT", "WHEN", "RESUME"}),
+        ("WHEN ", {"ok", "NOT", "PRIORITY", "INPUT"}),
+        ("WHEN ok ", {"DO", "AND"}),
+        ("WHEN ok DO ", {"MOVE", "BRAKE"}),
         ("TRY n = 1 RECOVER (", {"MOTION", "TIMEOUT"}),
         ("WAIT ", {"UNTIL"}),
         ("WAIT UNTIL ok ", {"WITHIN", "AND"}),

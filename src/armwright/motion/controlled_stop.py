@@ -7,6 +7,9 @@ on its path, and with
 
 a clock that only slows down never asks a joint for more speed than the motion does, nor, where τ̈ is 0, for more
 acceleration. So there is always a stop within the limits, however near to them the motion runs: at worst its own end.
+
+A motion that was stopped so is resumed by a clock that begins at the rate 0 and comes smoothly to the rate 1. Where the
+path asks for all of an acceleration, a slower start leaves room for that of the clock.
 """
 
 from __future__ import annotations
@@ -35,8 +38,24 @@ _ROUNDING = 1e-6
 _ROUNDING = 1e-9
 # Steps are halved so often before the motion is run to its own end instead.
 _HALVINGS = 6
+# A start that is too fast is made so many times longer, at most so often; each try is dear, and a longer start is slow.
+_LONGER = 1.25
+_TRIES = 60
 # Positions on each step at which accelerations are sampled.
 _LOOKS = np.linspace(0.0, 1.0, 9)
+
+
+@attrs.frozen
+class Stop:
+    """A motion that was stopped on its path.
+
+    Attributes:
+        trajectory: from the stop to rest.
+        reached: the time of the motion whose position the arm comes to rest at [s].
+    """
+
+    trajectory: Trajectory
+    reached: float
 
 
 def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Trajectory:
@@ -54,6 +73,53 @@ def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: flo
     Raises:
         InvalidValueError: ``t`` is outside the motion, or an acceleration is not above 0.
     """
+    return stop_on_path(running, t, acceleration, period=period).trajectory
+
+
+def stop_on_path(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Stop:
+    """Return the motion that stops an arm along its path, as ``brake`` does, and how far on its path the arm comes."""
+    limit, own = _limits(running, t, acceleration)
+    if t == running.duration or not running(t, 1).any():
+        return Stop(hold(running(t), period or _STEP), t)
+    # What the motion exceeds its limits by, it cannot be held to.
+    allowed = np.maximum(limit, own) * (1 + _ROUNDING)
+    for halving in range(_HALVINGS):
+        cells = _Clock(running, limit, t, period).cells(0.5**halving)
+        stop = _run_by(running, cells)
+        if (_peaks(stop) <= allowed).all():
+            return Stop(_until_a_tick(stop, period), min(cells[-1].at(cells[-1].length)[0], running.duration))
+    return Stop(_until_a_tick(_run_by(running, _to_its_end(running, t)), period), running.duration)
+
+
+def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Trajectory:
+    """Return the motion from rest at a position of a path along the rest of it.
+
+    Its speeds and accelerations begin at 0 and do not jump; once the start is over it runs as the motion did.
+
+    Args:
+        running: the motion whose path is followed, within its limits, to rest at its end.
+        t: its time whose position the arm stands at [s].
+        acceleration: largest accelerations (n,) [rad/s²] or [m/s²]; a joint without a limit counts as in ``brake``.
+        period: of the servo [s], to last a whole number of them; any duration when left out.
+
+    Raises:
+        InvalidValueError: ``t`` is outside the motion, or an acceleration is not above 0.
+    """
+    limit, own = _limits(running, t, acceleration)
+    if t == running.duration:
+        return hold(running(t), period or _STEP)
+    allowed = np.maximum(limit, own) * (1 + _ROUNDING)
+    length = max(2 * float((np.abs(running(t, 1)) / limit).max()), period or _STEP, 2 * _RAMP)
+    for _ in range(_TRIES):
+        start = _run_by(running, _from_rest(running, t, length))
+        if (start.peaks(2) <= allowed).all():
+            break
+        length *= _LONGER
+    return _until_a_tick(start, period)
+
+
+def _limits(running: Trajectory, t: float, acceleration: ArrayLike) -> tuple[Array, Array]:
+    """Return the largest accelerations (n,) that are allowed, and those of the motion itself; check the arguments."""
     if not 0 <= number(t, "t") <= running.duration:
         raise InvalidValueError(f"t: expected 0 to {running.duration:g} s, got {t:g}")
     limit = np.asarray(acceleration, dtype=np.float64)
@@ -61,15 +127,7 @@ def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: flo
     limit = one_per_joint(np.where(np.isfinite(limit), limit, np.maximum(own, 1.0)), len(own), "acceleration")
     if not (limit > 0).all():
         raise InvalidValueError(f"acceleration: expected more than 0 for every joint, got {limit.min():g}")
-    if t == running.duration or not running(t, 1).any():
-        return hold(running(t), period or _STEP)
-    # What the motion exceeds its limits by, it cannot be held to.
-    allowed = np.maximum(limit, own) * (1 + _ROUNDING)
-    for halving in range(_HALVINGS):
-        stop = _run_by(running, _Clock(running, limit, t, period).cells(0.5**halving))
-        if (_peaks(stop) <= allowed).all():
-            return _until_a_tick(stop, period)
-    return _until_a_tick(_run_by(running, _to_its_end(running, t)), period)
+    return limit, own
 
 
 @attrs.frozen
@@ -185,6 +243,26 @@ def _to_its_end(running: Trajectory, t: float) -> list[_Cell]:
     times = running.times.tolist()
     parts = ((segment, max(t, start), end) for segment, (start, end) in enumerate(pairwise(times)))
     return [_Cell(end - start, segment, start, 1.0, 0.0, 0.0) for segment, start, end in parts if end > start]
+
+
+def _from_rest(running: Trajectory, t: float, length: float) -> list[_Cell]:
+    """Return the clock that stands still at a time of the motion, and runs at the rate 1 after a length of time."""
+    times, half, most = running.times.tolist(), length / 2, 2 / length
+    segment = int(np.searchsorted(running.times, t, side="right")) - 1
+    cells: list[_Cell] = []
+    tau, rate, slowing = t, 0.0, 0.0
+    for fading in (most / half, -most / half):
+        left = half
+        while left > 0 and segment < len(times) - 1:
+            cell, end = _Cell(left, segment, tau, rate, slowing, fading), times[segment + 1]
+            tau, rate, slowing = cell.at(left)
+            if tau >= end:
+                cell = attrs.evolve(cell, length=cell.until(end))
+                _, rate, slowing = cell.at(cell.length)
+                tau, segment = end, segment + 1
+            left -= cell.length
+            cells += [cell] if cell.length > 0 else []
+    return cells + (_to_its_end(running, tau) if segment < len(times) - 1 else [])
 
 
 def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:

@@ -14,7 +14,7 @@ from armwright.arm.coupling import Coupling
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array
 from armwright.kinematics.inverse_kinematics.solution import Violation, violations_of_all
-from armwright.motion.controlled_stop import brake
+from armwright.motion.controlled_stop import Stop, resume, stop_on_path
 from armwright.motion.trajectory import Trajectory
 
 
@@ -37,15 +37,29 @@ def limited_motion(arm: Arm, trajectory: Trajectory) -> Trajectory:
     return attrs.evolve(trajectory, coefficients=limited_positions(arm, trajectory.coefficients))
 
 
-def braked(arm: Arm, running: Trajectory, t: float, *, period: float) -> Trajectory:
+def braked(arm: Arm, running: Trajectory, t: float, *, period: float) -> Stop:
     """Return the motion that stops an arm along its path within its limits of acceleration: see ``brake``."""
+    stop = stop_on_path(limited_motion(arm, running), t, _accelerations(arm), period=period)
+    return attrs.evolve(stop, trajectory=_of_joints(arm, stop.trajectory))
+
+
+def resumed(arm: Arm, running: Trajectory, t: float, *, period: float) -> Trajectory:
+    """Return the rest of a motion of an arm that stands on its path, within its limits: see ``resume``."""
+    return _of_joints(arm, resume(limited_motion(arm, running), t, _accelerations(arm), period=period))
+
+
+def _accelerations(arm: Arm) -> Array:
+    """Return the largest accelerations (k,) of all that has limits."""
     if _with_limits(arm) is None:
-        return brake(running, t, arm.limits.acceleration, period=period)
+        return arm.limits.acceleration
     limits = arm.all_limits.acceleration
     # A drive whose acceleration has no limit brakes as its joints do.
-    limits = np.where(np.isfinite(limits) | (np.arange(len(limits)) < arm.n), limits, LARGEST)
-    stop = brake(limited_motion(arm, running), t, limits, period=period)
-    return attrs.evolve(stop, coefficients=stop.coefficients[:, :, : arm.n])
+    return np.where(np.isfinite(limits) | (np.arange(len(limits)) < arm.n), limits, LARGEST)
+
+
+def _of_joints(arm: Arm, trajectory: Trajectory) -> Trajectory:
+    """Return the motion of the joints (n,) out of that of all that has limits."""
+    return attrs.evolve(trajectory, coefficients=trajectory.coefficients[:, :, : arm.n])
 
 
 def passed_limits(arm: Arm, trajectory: Trajectory) -> Iterator[Violation]:

@@ -29,14 +29,14 @@ def generate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow
     out = Emitter(source, symbols.scope(None))
     context = Context(GENERATORS, out, flow, spelling)
     context.generate(*symbols.constant_assignments(program))
-    context.generate(*program.statements)
+    context.generate_list(*program.statements)
     out.begin()
     out.emit(Op.STOP, span=program.end)
     procedures = {}
     for procedure in program.procedures:
         own = symbols.procedures[procedure.name.key]
         start, out.scope = out.here.index, symbols.scope(procedure.name.key)
-        context.generate(*procedure.body.statements)
+        context.generate_list(*procedure.body.statements)
         out.begin()
         out.emit(Op.RET if own.result is None else Op.NORET, span=procedure.body.end)
         procedures[procedure.name.key] = ProcedureCode(

@@ -6,9 +6,10 @@ from typing import Any, TypeAlias
 import attrs
 
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Op, Operand
+from armwright.program.bytecode.instructions import JumpTarget, Op, Operand
 from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.names import is_arm
+from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 
 Generate: TypeAlias = Callable[["Context", Any], object]
@@ -25,6 +26,7 @@ class Context:
         flow: the arms of the statements.
         spelling: how the program writes its names.
         in_action: whether the statements are the action of an ON, whose HALT ends the MOVE and not the program.
+        watches: the WHENs of the present stretch of statements, by their instructions.
     """
 
     generators: Generators
@@ -32,6 +34,7 @@ class Context:
     flow: Flow
     spelling: Mapping[str, str]
     in_action: bool = False
+    watches: list[int] = attrs.field(factory=list)
 
     def generate(self, *statements: tree.Statement) -> None:
         """Generate the code of statements, one after the other."""
@@ -40,6 +43,16 @@ class Context:
             if not isinstance(statement, tree.Block):
                 self.out.begin()
             self.generators[type(statement)](self, statement)
+
+    def generate_list(self, *statements: tree.Statement) -> None:
+        """Generate a stretch of statements, at whose end its WHENs are disarmed."""
+        outside, self.watches = self.watches, []
+        self.generate(*statements)
+        if self.watches:
+            # No statement of its own: it belongs to the end of the stretch.
+            span = statements[-1].span
+            self.out.emit(Op.DISARM, *map(JumpTarget, self.watches), span=Span(span.end, span.end))
+        self.watches = outside
 
     def generate_with(self, *statements: tree.Statement, in_action: bool) -> None:
         """Generate the code of statements as those of an action, or as others."""

@@ -39,7 +39,7 @@ def while_(context: Context, node: tree.While) -> None:
 def repeat(context: Context, node: tree.Repeat) -> None:
     """Generate a loop that is tested at its end."""
     out, top = context.out, context.out.here
-    context.generate(*node.body)
+    context.generate_list(*node.body)
     out.begin()
     out.emit(Op.JZ, out.value(node.condition), top, span=node.tail)
 
@@ -74,7 +74,8 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
     over = out.emit(Op.JMP, LATER, span=out.instructions[join].span)
     for branch, fork in zip(node.branches, forks, strict=True):
         out.patch_jump(fork)
-        context.generate_with(*branch.body.statements, in_action=False)
+        context.generate_with(branch.body, in_action=False)
+        out.begin()
         out.begin()
         out.emit(Op.QUIT, span=branch.body.end)
     out.patch_jump(over)
@@ -117,6 +118,24 @@ def wait_until(context: Context, node: tree.WaitUntil) -> None:
     out.patch_jump(over)
 
 
+def when(context: Context, node: tree.When) -> None:
+    """Generate the arming of a WHEN, with condition and action behind it, each ended by RET."""
+    out, truth = context.out, context.out.passing()
+    name = () if node.name is None else (node.name.key,)
+    operands = (0.0 if node.priority is None else node.priority.value, *name)
+    watch = out.emit(Op.WHEN, LATER, truth, LATER, *operands, span=node.head)
+    context.watches.append(watch)
+    over = out.emit(Op.JMP, LATER, span=node.head)
+    condition = out.here
+    out.value(node.condition, truth)
+    out.emit(Op.RET, span=node.head)
+    action = out.here
+    context.generate_with(node.action, in_action=False)
+    out.emit(Op.RET, span=node.action.span)
+    out.instructions[watch] = attrs.evolve(out.instructions[watch], operands=(condition, truth, action, *operands))
+    out.patch_jump(over)
+
+
 def lock(context: Context, node: tree.Lock) -> None:
     """Generate a body between LOCK and UNLK of the same variables."""
     locked = [context.out.value(target) for target in node.targets]
@@ -130,10 +149,10 @@ def try_(context: Context, node: tree.Try) -> None:
     out = context.out
     kinds = (kind.key for kind in node.kinds if isinstance(kind, tree.Name))
     attempt = out.emit(Op.TRY, LATER, *kinds, span=node.span)
-    context.generate(*node.body)
+    context.generate_list(*node.body)
     succeeded = out.emit(Op.ENDT, LATER, span=node.span)
     out.patch_jump(attempt)
-    context.generate(*node.recovery)
+    context.generate_list(*node.recovery)
     out.emit(Op.ENDR, span=node.span)
     out.patch_jump(succeeded)
 
@@ -156,7 +175,7 @@ def call(context: Context, node: tree.Call) -> None:
 
 
 GENERATORS: Generators = {
-    tree.Block: lambda context, node: context.generate(*node.statements),
+    tree.Block: lambda context, node: context.generate_list(*node.statements),
     tree.If: if_,
     tree.While: while_,
     tree.Repeat: repeat,
@@ -166,6 +185,12 @@ GENERATORS: Generators = {
     tree.Wait: wait,
     tree.WaitUntil: wait_until,
     tree.Pause: one_instruction(Op.PAUSE),
+    tree.When: when,
+    tree.WatchSwitch: lambda context, node: context.out.emit(
+        Op.WHSET, node.name.key, "ON" if node.on else "OFF", span=node.span
+    ),
+    tree.Brake: one_instruction(Op.BRAKE),
+    tree.Resume: one_instruction(Op.RESUME),
     tree.Lock: lock,
     tree.Try: try_,
     tree.Retry: one_instruction(Op.RETRY),

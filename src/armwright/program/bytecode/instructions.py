@@ -136,6 +136,11 @@ class Op(enum.StrEnum):
     UNTIL = "UNTIL", "jnj(N)"  # condition, truth value, place when it is too late[, seconds]: look at every tick
     LATE = "LATE", ""  # a WAIT UNTIL has lasted too long
     PAUSE = "PAUSE", "N"  # seconds
+    WHEN = "WHEN", "jnjN(w)"  # condition, truth value, action, priority[, name]: look at every tick, act when it holds
+    WHSET = "WHSET", "wo"  # name of a WHEN, ON or OFF
+    DISARM = "DISARM", "j+"  # WHENs of a block that ends
+    BRAKE = "BRAKE", ""  # in the action of a WHEN: stop the motion that it interrupts
+    RESUME = "RESUME", ""  # and let it go on
     LOCK = "LOCK", "n+"  # variables or elements
     UNLK = "UNLK", "n+"  # the same
     TRY = "TRY", "j(w+)"  # place of the recovery[, kinds of errors]

@@ -63,6 +63,7 @@ class Routine(enum.Enum):
     BRANCH = "a branch"
     CONDITION = "a condition"
     ACTION = "an action"
+    WATCH = "the action of a WHEN"
 
 
 @attrs.frozen

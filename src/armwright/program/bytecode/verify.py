@@ -87,11 +87,13 @@ _OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RAISE, Op.RETV, 
 _PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
-    Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION),
+    Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION, Routine.WATCH),
     Op.QUIT: (Routine.BRANCH,),
     **dict.fromkeys((Op.RETV, Op.NORET), (Routine.FUNCTION,)),
     Op.MVHLT: (Routine.ACTION,),
-    **dict.fromkeys((Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION)),
+    **dict.fromkeys(
+        (Op.HALT, Op.STOP), (Routine.PROGRAM, Routine.PROCEDURE, Routine.BRANCH, Routine.ACTION, Routine.WATCH)
+    ),
 }
 _ENDS = {*_ENDED_ROUTINES, Op.JMP, Op.ENDT, Op.RETRY, Op.RAISE, Op.LATE}
 
@@ -250,9 +252,17 @@ def _element(verifier: Verifier, state: State) -> Flow:
 def _guard(verifier: Verifier, state: State) -> Flow:
     (condition, action), truth = verifier.targets, verifier.operands[1]
     if not str(truth).startswith("%"):
-        raise verifier.wrong(f"MVON expects a temporary such as %1 for the value of its condition, got {truth}")
+        raise verifier.wrong(
+            f"{verifier.op} expects a temporary such as %1 for the value of its condition, got {truth}"
+        )
     verifier.begin(condition, Routine.CONDITION, state, str(truth))
-    verifier.begin(action, Routine.ACTION, state)
+    verifier.begin(action, Routine.ACTION if verifier.op is Op.MVON else Routine.WATCH, state)
+    return Flow(state)
+
+
+def _disarm(verifier: Verifier, state: State) -> Flow:
+    if any(verifier.code.instructions[target].op is not Op.WHEN for target in verifier.targets):
+        raise verifier.wrong("DISARM expects instructions WHEN")
     return Flow(state)
 
 
@@ -375,6 +385,8 @@ _RULES: Mapping[Op, Rule] = {
     **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
+    Op.WHEN: _guard,
+    Op.DISARM: _disarm,
     Op.UNTIL: _until,
     Op.AWAIT: lambda verifier, state: Flow(state, (verifier.targets[0], state)),
     Op.LOG: _log,

@@ -90,6 +90,10 @@ class Timeline:
         """Whether the next step of a process begins a statement, or another pass of a loop."""
         if process.pending_effect is not None or process.followed_motion is not None:
             return False
+        judge, work = process.judge_tick, process.work_tick
+        if judge is not None and (work is None or judge <= max(work, self.machine.state.ticks)):
+            # It is served to judge its WHENs.
+            return False
         step = self.machine.code.instructions[process.pc]
         if not step.begins or process.path in self.progress.blocked:
             return False
@@ -111,7 +115,9 @@ class Timeline:
         index = process.pc
         if self.begins_statement(process):
             progress.visits[index] = progress.visits.get(index, 0) + 1
-        instruction = process.pending_effect is None and process.followed_motion is None
+        ticks = max(process.due_tick or 0, machine.state.ticks)
+        judges = process.judge_tick is not None and process.judge_tick <= ticks
+        instruction = process.pending_effect is None and process.followed_motion is None and not judges
         advance(machine, process)
         if instruction:
             progress.last_instructions[process.path] = index

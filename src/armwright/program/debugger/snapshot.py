@@ -47,7 +47,7 @@ def moving_process(machine: Machine, frame: str) -> Process | None:
 
 @attrs.frozen(kw_only=True)
 class StackFrame:
-    """One level of the stack of a process: the program itself, a procedure, the action of a MOVE.
+    """One level of the stack of a process: the program itself, a procedure, the action of a MOVE or of a WHEN.
 
     Attributes:
         process: whose stack it is of.
@@ -81,4 +81,6 @@ def call_stack(machine: Machine, process: Process, statements: Statements) -> li
 def _frame_title(machine: Machine, process: Process, activation: Activation) -> str:
     if activation.kind == "procedure":
         return machine.spelling(activation.name)
+    if activation.interrupted is not None:
+        return activation.interrupted.title
     return f"ON of a MOVE of {process.title}" if activation.kind == "action" else process.title

@@ -9,7 +9,7 @@ from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.source import Span
 
 # What stands behind the last statement of a part, though it belongs to a statement around it.
-_TRAILING = frozenset((Op.JMP, Op.ENDT, Op.ENDR, Op.UNLK, Op.RET, Op.QUIT))
+_TRAILING = frozenset((Op.JMP, Op.ENDT, Op.ENDR, Op.UNLK, Op.RET, Op.QUIT, Op.DISARM))
 
 
 @attrs.frozen(kw_only=True)

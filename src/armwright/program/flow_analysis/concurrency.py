@@ -168,15 +168,15 @@ def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> 
 
 
 def _may_halt_while_waiting(scope: Scope, statements: Sequence[tree.Statement]) -> bool:
-    """Whether a HALT may end the program while other processes wait."""
+    """Whether a HALT may end the program while processes wait, or the action of a WHEN may end a wait by an error."""
     waiting = [(statement, scope.procedure is not None) for statement in statements]
     while waiting:
         node, is_concurrent = waiting.pop()
-        if is_concurrent and isinstance(node, tree.Halt):
+        if is_concurrent and isinstance(node, tree.Halt | tree.Raise):
             return True
         # In an action of a MOVE it only ends the MOVE.
         children = () if isinstance(node, tree.Move) else child_statements(node)
-        waiting += [(child, is_concurrent or isinstance(node, tree.Cobegin)) for child in children]
+        waiting += [(child, is_concurrent or isinstance(node, tree.Cobegin | tree.When)) for child in children]
     return False
 
 

@@ -40,6 +40,7 @@ class Context:
         activations: the number of calls so far.
         followed: procedures whose body was analysed at a call.
         skipped: procedures whose body was not analysed at a call.
+        braked: whether a WHEN may brake a MOVE here, so that it does not come to its goal.
     """
 
     steps: Steps
@@ -51,14 +52,19 @@ class Context:
     activations: int = 0
     followed: set[str] = attrs.field(factory=set)
     skipped: set[str] = attrs.field(factory=set)
+    braked: bool = False
 
     def follow(self, *statements: tree.Statement) -> None:
         """Analyse statements in order, up to a HALT; those that are nested too deep only invalidate facts."""
+        facts, braked = self.state.facts, self.braked
+        uncertainties = facts.uncertainties
         for statement in statements:
             if self.state.ended:
                 self.state.report_unreachable(statement.span)
-                return
+                break
             self.follow_one(statement)
+        # Its WHENs are disarmed here.
+        facts.uncertainties, self.braked = uncertainties, braked
 
     def follow_one(self, statement: tree.Statement) -> None:
         """Analyse one statement; where it is nested too deep, only invalidate what it changes."""

@@ -8,8 +8,8 @@ from armwright.program.flow_analysis.calls import call
 from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import Divergence
-from armwright.program.flow_analysis.lattice import Outcome, Uncertainty
-from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, SideEffects, union
+from armwright.program.flow_analysis.lattice import EVERYTHING, Outcome, Uncertainty
+from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, NOTHING, SideEffects, union
 from armwright.program.flow_analysis.state import LAST, Uses
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
@@ -191,6 +191,26 @@ def _assigned_before_failure(context: Context, statements: Sequence[tree.Stateme
             yield name
 
 
+def when(context: Context, node: tree.When) -> None:
+    """Analyse an action that may run at any time, up to the end of this stretch of statements, or never."""
+    state, facts = context.state, context.state.facts
+    require_value(state, node.condition)
+    effects = context.side_effects(node.action)
+    if not state.is_first_pass:
+        mark, uncertainties = facts.checkpoint(), facts.uncertainties
+        facts.invalidate(EVERYTHING)
+        outside, context.recovering = context.recovering, False
+        with state.conditional():
+            context.follow(node.action)
+        context.recovering = outside
+        facts.roll_back(mark)
+        facts.uncertainties, state.ended = uncertainties, False
+    message, advice = "it gets a value in the action of this WHEN, which may not run", "give it a value before the WHEN"
+    state.forget_undone(effects, state.divergence(node.head, message, advice))
+    facts.uncertainties = (*facts.uncertainties, _uncertainty(context, NOTHING, effects))
+    context.braked = context.braked or bool(effects.arms) or effects.brakes or effects.everything
+
+
 def lock(context: Context, node: tree.Lock) -> None:
     """Analyse the body of a LOCK."""
     require_indices(context.state, *node.targets)
@@ -254,6 +274,10 @@ STEPS: Steps = {
     tree.Wait: wait,
     tree.WaitUntil: wait_until,
     tree.Pause: lambda context, node: require_value(context.state, node.duration),
+    tree.When: when,
+    tree.WatchSwitch: lambda *_: None,
+    tree.Brake: lambda *_: None,
+    tree.Resume: lambda *_: None,
     tree.Lock: lock,
     tree.Try: try_,
     tree.Retry: end,

@@ -35,7 +35,7 @@ def move(context: Context, node: tree.Move) -> None:
             state.ended = False
         message, advice = "it gets a value in this action, which may not run", "give it a value before the MOVE"
         state.forget_undone(effects, state.divergence(guard.head, message, advice))
-    halted = any(context.side_effects(guard.action).halts for guard in guards)
+    halted = context.braked or any(context.side_effects(guard.action).halts for guard in guards)
     _end_move(state, node, arm, halted=halted)
 
 

@@ -36,6 +36,7 @@ class SideEffects:
         everything: whether it may be anything.
         halts: whether HALT may end it.
         retries: whether RETRY may run a TRY part around it again.
+        brakes: whether BRAKE may keep the MOVE that it interrupts from its goal.
     """
 
     posed: frozenset[str] = frozenset()
@@ -47,6 +48,7 @@ class SideEffects:
     everything: bool = False
     halts: bool = False
     retries: bool = False
+    brakes: bool = False
 
     def __or__(self, other: "SideEffects") -> "SideEffects":
         """Return the union of two side effects."""
@@ -55,7 +57,7 @@ class SideEffects:
         merged = SideEffects(**{name: getattr(self, name) | getattr(other, name) for name in _FIELDS})
         count = sum(map(len, (merged.posed, merged.affixed, merged.moved, merged.values)))
         if merged.everything or count > _MAX_EFFECTS:
-            return attrs.evolve(ANYTHING, halts=merged.halts, retries=merged.retries)
+            return attrs.evolve(ANYTHING, halts=merged.halts, retries=merged.retries, brakes=merged.brakes)
         return merged
 
     @property
@@ -184,6 +186,7 @@ _OWN_EFFECTS: Mapping[type, Callable[..., SideEffects]] = {
     tree.For: lambda scope, node: SideEffects(values=_names(scope, node.variable)),
     tree.Halt: lambda _scope, _node: SideEffects(halts=True),
     tree.Retry: lambda _scope, _node: SideEffects(retries=True),
+    tree.Brake: lambda _scope, _node: SideEffects(brakes=True),
     tree.Poison: _effects_of_poison,
 }
 
@@ -204,6 +207,7 @@ _CHILDREN: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
     tree.While: lambda node: (node.body,),
     tree.For: lambda node: (node.body,),
     tree.Lock: lambda node: (node.body,),
+    tree.When: lambda node: (node.action,),
     tree.Repeat: lambda node: node.body,
     tree.Wait: lambda node: () if node.otherwise is None else (node.otherwise,),
     tree.WaitUntil: lambda node: () if node.otherwise is None else (node.otherwise,),

@@ -162,7 +162,7 @@ class _Layout:
                 self._wait(node, column)
             case tree.If():
                 self._if(node, column)
-            case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body):
+            case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body) | tree.When(action=body):
                 self._nested(body, column)
             case tree.Block():
                 self._block(node, column)

@@ -154,7 +154,11 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
             is_axis = before == "(" and earlier in WITH_AXIS and key in AXES and follows == ")"
             if in_units or is_axis or statement_phrase(before, key, follows) or (before == "READ" and key in SENSORS):
                 yield key
-            elif before in ("OPERATE", "PULSE") or (before == "(" and earlier in WITH_DEVICE and follows == ")"):
+            elif (
+                before in ("OPERATE", "PULSE")
+                or (before == "WHEN" and follows in (":", "ON", "OFF"))
+                or (before == "(" and earlier in WITH_DEVICE and follows == ")")
+            ):
                 yield token.text
             else:
                 yield names.spelling(token, follows)

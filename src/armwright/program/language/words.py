@@ -71,6 +71,8 @@ PARAMETER_MODES = ("IN", "INOUT")
 STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE")
 # What starts a statement only in front of a text.
 STATEMENTS_BEFORE_TEXT = ("LOG",)
+# What is a statement by itself, where neither `=` nor a bracket follows.
+STATEMENTS_ALONE = ("BRAKE", "RESUME")
 WORDS_IN_CONTEXT = frozenset(
     (
         *TYPES_IN_CONTEXT,
@@ -79,7 +81,9 @@ WORDS_IN_CONTEXT = frozenset(
         *STATEMENTS_BEFORE_NAME,
         *STATEMENTS_BEFORE_TEXT,
         "AS",
+        *STATEMENTS_ALONE,
         "RETURN",
+        "WHEN",
         "WITHIN",
     )
 )

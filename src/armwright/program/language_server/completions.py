@@ -16,6 +16,7 @@ from armwright.program.language.words import (
     BLOCK_CLOSERS,
     SENSORS,
     STATEMENT_PHRASES,
+    STATEMENTS_ALONE,
     STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     VALUES,
@@ -52,6 +53,10 @@ _SNIPPETS = {
     "COBEGIN": (("COBEGIN ... COEND", "COBEGIN\n  BEGIN\n    $1\n  END ;\n  BEGIN\n    $0\n  END\nCOEND ;"),),
     "TRY": (("TRY ... RECOVER", "TRY\n  $1\nRECOVER\n  $0\nEND ;"),),
     "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
+    "WHEN": (
+        ("WHEN ... DO", "WHEN ${1:condition} DO\nBEGIN\n  BRAKE ;\n  $0\n  RESUME\nEND ;"),
+        ("WHEN ... OFF", "WHEN ${1:name} OFF ;"),
+    ),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "MODULE": (("MODULE ...", "MODULE ${1:name} ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
@@ -255,7 +260,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
             yield word
     if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
         yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
-        yield from (*STATEMENTS_BEFORE_TEXT, *STATEMENTS_BEFORE_NAME)
+        yield from (*STATEMENTS_BEFORE_TEXT, *STATEMENTS_BEFORE_NAME, "WHEN", *STATEMENTS_ALONE)
 
 
 class _ItemFactory:

@@ -23,7 +23,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.vm.value_text import value_text
 
 # Words that a statement can start with and that a word of the same statement is looked up by.
-_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
+_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE", "WHEN"))
 
 
 # What something is, as the language would write it; and what there is to say about it, a sentence or fact each.
@@ -111,6 +111,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.ERROR:
             own = "a kind of error of the program, which RAISE raises and RECOVER may name"
             description = text, [f"a kind of error: {KINDS[key]}" if key in KINDS else own]
+        case NameKind.WATCH:
+            description = text, ["the name of a WHEN, by which it is armed and disarmed"]
         case NameKind.AXIS:
             description = key, [f"the {key.lower()} axis"]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:

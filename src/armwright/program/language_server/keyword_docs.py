@@ -116,7 +116,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "UNTIL": ("REPEAT statements UNTIL condition", "Ends the loop when the condition holds."),
     "FOR": (_FOR, "Repeats a statement while a SCALAR counts."),
     "STEP": (_FOR, "The increment of the variable in each pass; 1 without it."),
-    "DO": ("WHILE ... DO | FOR ... DO | LOCK ... DO | ON ... DO", "Precedes the statement that it governs."),
+    "DO": (
+        "WHILE ... DO | FOR ... DO | LOCK ... DO | ON ... DO | WHEN ... DO",
+        "Precedes the statement that it governs.",
+    ),
     "AND": ("condition AND condition", "Holds when both hold."),
     "OR": ("condition OR condition", "Holds when one of them holds, or both."),
     "NOT": ("NOT condition", "Holds when the condition does not."),
@@ -137,6 +140,12 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "WAIT event | UNTIL condition WITHIN seconds [ELSE statement]",
         "The longest time of the wait; when it is over the statement runs, and without one it is an error.",
     ),
+    "WHEN": (
+        "WHEN [name :] [PRIORITY number :] condition DO statement",
+        "Runs the statement whenever the condition comes true on a servo tick, until the end of its block.",
+    ),
+    "BRAKE": ("BRAKE", "In the action of a WHEN: stops the MOVE that it interrupts on its path, and waits for that."),
+    "RESUME": ("RESUME", "In the action of a WHEN: lets the MOVE that it has braked go on, from where it was braked."),
     "LOCK": ("LOCK (variables) DO statement", "Other LOCKs of these variables wait until the statement has ended."),
     # recovery
     "TRY": (_TRY, "Runs statements; when one of them fails, those after RECOVER run instead of the rest."),
@@ -207,6 +216,12 @@ _STATEMENT_WORDS: Mapping[tuple[str, str], tuple[str, str]] = {
     ("FOR", "TO"): (_FOR, "Precedes the last value; both bounds are evaluated once, before the loop."),
     ("MOVE", "TO"): (_MOVE, "Precedes the goal."),
     ("OPERATE", "ON"): ("OPERATE device ON", "Switches a device on; this is the default."),
+    ("WHEN", "ON"): ("WHEN name ON", "Arms a WHEN again that was disarmed."),
+    ("WHEN", "OFF"): ("WHEN name OFF", "Disarms a WHEN until it is armed again."),
+    ("WHEN", "PRIORITY"): (
+        "WHEN [name :] PRIORITY number : condition DO statement",
+        "An action of a larger number is served first, and interrupts one of a smaller; 0 by default.",
+    ),
     ("MOVE", "ON"): (
         "ON condition DO action",
         "Checks the condition at every tick of the motion; acts once, when it first holds. HALT ends the motion.",

@@ -20,6 +20,7 @@ _NOT_RENAMEABLE = {
     NameKind.SENSOR: "a reserved word",
     NameKind.AXIS: "an axis",
     NameKind.ERROR: "a kind of error",
+    NameKind.WATCH: "the name of a WHEN",
 }
 
 
@@ -134,5 +135,6 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
-    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE, NameKind.ERROR)
+    fixed = {NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE}
+    fixed |= {NameKind.ERROR, NameKind.WATCH}
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

@@ -33,6 +33,7 @@ class NameKind(enum.Enum):
     AXIS = "axis"
     VALUE = "value of the language"
     ERROR = "kind of error"
+    WATCH = "name of a WHEN"
     UNKNOWN = "unknown name"
 
 
@@ -158,8 +159,9 @@ def _classify_name(token: Token, key: str, scope: Scope, previous: str, next_key
     phrase = statement_phrase(previous, key, next_key)
     if phrase or (previous == "READ" and key in SENSORS):
         return Occurrence(start, end, phrase or key, NameKind.SENSOR)
-    if previous in ("OPERATE", "PULSE"):
-        return Occurrence(start, end, key, NameKind.DEVICE)
+    is_watch = previous == "WHEN" and next_key in (":", "ON", "OFF")
+    if is_watch or previous in ("OPERATE", "PULSE"):
+        return Occurrence(start, end, key, NameKind.WATCH if is_watch else NameKind.DEVICE)
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)
     return _classify_variable(token, key, scope)

@@ -51,7 +51,7 @@ def check(
     calls = CallChecker(names)
     for procedure in procedures:
         with names.enter_procedure(procedure):
-            Context(CHECKS, names, calls, procedure).check(*procedure.node.body.statements)
+            Context(CHECKS, names, calls, procedure, interrupting=True).check(*procedure.node.body.statements)
             if procedure.is_function:
                 functions.check_function(names, procedure)
     Context(CHECKS, names, calls).check(*program.statements)

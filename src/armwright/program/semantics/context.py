@@ -25,6 +25,8 @@ class Context:
         calls: the checks of calls.
         procedure: the one that contains the statements; None for the main program.
         recovering: whether a RECOVER part contains them, so that RETRY can restart its TRY.
+        watches: the WHENs with a name in the stretches of statements around them.
+        interrupting: whether they are the action of a WHEN, or may be called by one.
     """
 
     checks: Checks
@@ -32,6 +34,14 @@ class Context:
     calls: CallChecker
     procedure: ProcedureSymbols | None = None
     recovering: bool = False
+    watches: dict[str, tree.When] = attrs.field(factory=dict)
+    interrupting: bool = False
+
+    def check_list(self, *statements: tree.Statement) -> None:
+        """Check a stretch of statements, at whose end its WHENs are disarmed."""
+        outside, self.watches = self.watches, dict(self.watches)
+        self.check(*statements)
+        self.watches = outside
 
     def check(self, *statements: tree.Statement) -> None:
         """Check statements, one after the other."""

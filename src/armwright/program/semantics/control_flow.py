@@ -1,6 +1,6 @@
 """Conditionals, loops, concurrent branches, events, locks, recovery and calls."""
 
-from armwright.program.language.diagnostic import did_you_mean
+from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.error_kinds import KINDS
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Checks, Context
@@ -40,7 +40,7 @@ def while_(context: Context, node: tree.While) -> None:
 
 def repeat(context: Context, node: tree.Repeat) -> None:
     """Check body and condition of REPEAT."""
-    context.check(*node.body)
+    context.check_list(*node.body)
     require_condition(context.names, node.condition, "UNTIL")
 
 
@@ -68,10 +68,14 @@ def for_(context: Context, node: tree.For) -> None:
 
 def cobegin(context: Context, node: tree.Cobegin) -> None:
     """Check priorities and bodies of branches."""
+    # A branch is another process: it switches no WHEN of this one, and no action of this one brakes its MOVEs.
+    watches, interrupting = context.watches, context.interrupting
+    context.watches, context.interrupting = {}, interrupting and context.procedure is not None
     for branch in node.branches:
         if branch.priority is not None:
             check_unit(context.names, branch.priority, None, "a priority has no unit")
         context.check_with(branch.body, recovering=False)
+    context.watches, context.interrupting = watches, interrupting
 
 
 def event(context: Context, node: tree.Signal | tree.Wait) -> None:
@@ -103,6 +107,46 @@ def pause(context: Context, node: tree.Pause) -> None:
         check_range(context.names, node.duration, "a pause", zero=True)
 
 
+def when(context: Context, node: tree.When) -> None:
+    """Check name, priority, condition and action of a WHEN."""
+    names, name = context.names, node.name
+    if node.priority is not None:
+        check_unit(names, node.priority, None, "a priority has no unit")
+    require_condition(names, node.condition, "WHEN")
+    if name is not None:
+        if (first := context.watches.get(name.key)) is not None:
+            text, here = f"`{name.text}` is the name of two WHENs", labels(first.head, "first")
+            names.report("E241", text, name.span, "second", secondary=here, advice="give this one another name")
+        context.watches[name.key] = node
+    outside, context.interrupting = context.interrupting, True
+    context.check_with(node.action, recovering=False)
+    context.interrupting = outside
+
+
+def watch_switch(context: Context, node: tree.WatchSwitch) -> None:
+    """Check that what is armed or disarmed is a WHEN of a block around it."""
+    names, name = context.names, node.name
+    if name.key not in context.watches:
+        near = names.closest_name(
+            name.text, lambda: [watch.name.text for watch in context.watches.values() if watch.name]
+        )
+        advice = (
+            did_you_mean(near) or f"write `WHEN {name.text} : condition DO ...` before, in this block or one around it"
+        )
+        names.report("E242", f"no WHEN here is called `{name.text}`", name.span, "not known here", advice=advice)
+
+
+def interrupted_move(context: Context, node: tree.Brake | tree.Resume) -> None:
+    """Check that BRAKE or RESUME may be run by the action of a WHEN."""
+    if not context.interrupting:
+        word, note = type(node).__name__.upper(), "it acts on the MOVE that a WHEN interrupts"
+        text, advice = (
+            f"{word} is outside of the action of a WHEN",
+            f"write `WHEN condition DO BEGIN ... {word} ... END`",
+        )
+        context.names.report("E243", text, node.span, "which MOVE?", note=note, advice=advice)
+
+
 def lock(context: Context, node: tree.Lock) -> None:
     """Check what is locked, which may be of any type, and a whole array too; then the body."""
     for target in node.targets:
@@ -113,8 +157,8 @@ def lock(context: Context, node: tree.Lock) -> None:
 def try_(context: Context, node: tree.Try) -> None:
     """Check both parts. An error in a RECOVER part goes outward: a TRY inside of it has a RECOVER of its own."""
     context.names.recovered += [kind for kind in node.kinds if isinstance(kind, tree.Name)]
-    context.check_with(*node.body, recovering=False)
-    context.check_with(*node.recovery, recovering=True)
+    context.check_with(tree.Block(node.span, node.body, node.recover), recovering=False)
+    context.check_with(tree.Block(node.span, node.recovery, node.end), recovering=True)
 
 
 def retry(context: Context, node: tree.Retry) -> None:
@@ -166,7 +210,7 @@ def poison(context: Context, node: tree.Poison) -> None:
 
 
 CHECKS: Checks = {
-    tree.Block: lambda context, node: context.check(*node.statements),
+    tree.Block: lambda context, node: context.check_list(*node.statements),
     tree.If: if_,
     tree.While: while_,
     tree.Repeat: repeat,
@@ -176,6 +220,10 @@ CHECKS: Checks = {
     tree.Wait: event,
     tree.WaitUntil: wait_until,
     tree.Pause: pause,
+    tree.When: when,
+    tree.WatchSwitch: watch_switch,
+    tree.Brake: interrupted_move,
+    tree.Resume: interrupted_move,
     tree.Lock: lock,
     tree.Try: try_,
     tree.Retry: retry,

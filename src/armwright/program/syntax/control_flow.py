@@ -264,19 +264,24 @@ def _branch_and_separator(tokens: TokenStream, branches: list[tree.Branch]) -> b
 # branch = [ "PRIORITY" number ":" ] block ;
 def _branch(tokens: TokenStream) -> tree.Branch:
     start = tokens.current
-    priority = None
-    if tokens.accept("PRIORITY"):
-        if tokens.current.kind is not TokenKind.NUMBER:
-            text = "expected a number after PRIORITY"
-            tokens.report_once("E111", text, tokens.current.span, "a number without a sign, such as `2`")
-        priority = _priority(tokens)
-        head = tokens.span_since(start)
-        tokens.expect(":", "after the priority", statement=True)
-    else:
-        head = start.span
+    priority, head = None, start.span
+    if tokens.matches("PRIORITY"):
+        priority = _priority_and_colon(tokens)
+        head = start.span.to(priority.span) if priority is not None else start.span
     tokens.note_expected_words("BEGIN", starts_statement=True)
     body = block(tokens) if tokens.matches("BEGIN") else _branch_without_block(tokens)
     return tokens.node(tree.Branch, start, head, priority, body)
+
+
+def _priority_and_colon(tokens: TokenStream) -> tree.Number | None:
+    """Read PRIORITY, the number behind it and the colon; return the number, None where there is none."""
+    tokens.take()
+    if tokens.current.kind is not TokenKind.NUMBER:
+        text = "expected a number after PRIORITY"
+        tokens.report_once("E111", text, tokens.current.span, "a number without a sign, such as `2`")
+    priority = _priority(tokens)
+    tokens.expect(":", "after the priority", statement=True)
+    return priority
 
 
 def _priority(tokens: TokenStream) -> tree.Number | None:
@@ -443,6 +448,45 @@ def _limited(
 def pause(tokens: TokenStream) -> tree.Pause:
     """Read one PAUSE."""
     return tokens.node(tree.Pause, tokens.take(), expression(tokens, "a number of seconds", "after PAUSE"))
+
+
+# when = "WHEN" [ name ":" ] [ "PRIORITY" number ":" ] expr "DO" statement ;
+# "WHEN" name ( "ON" | "OFF" )
+def when(tokens: TokenStream) -> tree.When | tree.WatchSwitch:
+    """Read one WHEN, or what arms and disarms one by its name."""
+    start = tokens.current
+    tokens.accept_word("WHEN")
+    name = priority = None
+    if tokens.current.kind is TokenKind.NAME and tokens.peek().key in (":", "ON", "OFF"):
+        name = tokens.take_name()
+        tokens.check_name_length(name)
+        if (word := tokens.accept("ON", "OFF")) is not None:
+            return tokens.node(tree.WatchSwitch, start, name, word.key == "ON")
+        tokens.take()
+    elif tokens.is_at_end:
+        tokens.note_expected_words("PRIORITY")
+    if tokens.matches("PRIORITY"):
+        priority = _priority_and_colon(tokens)
+    condition = head_expression(tokens, _CONDITION, "after WHEN", "DO")
+    head = tokens.span_since(start)
+    tokens.expect("DO", "after the condition", statement=True)
+    return tokens.node(tree.When, start, head, name, priority, condition, nested_statement(tokens, "DO"))
+
+
+# "BRAKE"
+def brake(tokens: TokenStream) -> tree.Brake:
+    """Read one BRAKE."""
+    start = tokens.current
+    tokens.accept_word("BRAKE")
+    return tree.Brake(start.span)
+
+
+# "RESUME"
+def resume(tokens: TokenStream) -> tree.Resume:
+    """Read one RESUME."""
+    start = tokens.current
+    tokens.accept_word("RESUME")
+    return tree.Resume(start.span)
 
 
 # "HALT"

@@ -9,8 +9,10 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import (
     BLOCK_CLOSERS,
     BLOCK_OPENERS,
+    COMPARISONS,
     FOREIGN_STATEMENTS,
     STATEMENT_PHRASES,
+    STATEMENTS_ALONE,
     STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     UNSUPPORTED_STATEMENTS,
@@ -25,6 +27,8 @@ _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.AR
 _BEFORE_STATEMENTS = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
 # What stands behind a name that is given a value.
 ASSIGNMENT_SIGNS = ("=", ":=", "==")
+# What goes on with a condition that begins in parentheses.
+_BEHIND_OPERAND = frozenset((*COMPARISONS, "+", "-", "*", "/", "AND", "OR", "DO"))
 _BEGINNINGS = "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
 # What opens the stretch that a word ends, for one that ends none.
 _OPENER_OF = {"UNTIL": "REPEAT", "COEND": "COBEGIN", "PRIORITY": "COBEGIN", "RECOVER": "TRY"}
@@ -223,7 +227,14 @@ def nested_statement(tokens: TokenStream, behind: str, *words: str) -> tree.Stat
         tokens.report_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
         tokens.suppress_reports()
         return tree.Poison(gap)
-    return parse_or_skip(tokens, statement) or tree.Poison(tokens.span_since(token))
+    nested = parse_or_skip(tokens, statement) or tree.Poison(tokens.span_since(token))
+    if isinstance(nested, tree.When):
+        text, advice = (
+            f"a WHEN behind {behind} would be disarmed at once",
+            "write it in the block around this statement",
+        )
+        tokens.report("E128", text, nested.head, "it is armed until the end of its block", advice=advice)
+    return nested
 
 
 def parse_or_skip(tokens: TokenStream, read: Callable[[TokenStream], _Parsed]) -> _Parsed | None:
@@ -299,11 +310,28 @@ def _starts_statement(tokens: TokenStream) -> bool:
 def _starts_phrase(tokens: TokenStream) -> bool:
     """Whether a word starts a statement here by what stands behind it, though programs may use it as a name."""
     after = tokens.peek()
-    if after.kind is TokenKind.STRING:
-        return tokens.matches_word(*STATEMENTS_BEFORE_TEXT)
+    if after.kind is TokenKind.STRING and tokens.matches_word(*STATEMENTS_BEFORE_TEXT):
+        return True
+    if tokens.matches_word("WHEN"):
+        return _starts_when(tokens, after)
+    if tokens.matches_word(*STATEMENTS_ALONE):
+        return after.key not in (*ASSIGNMENT_SIGNS, "(", "[")
     if tokens.matches_word(*STATEMENTS_BEFORE_NAME):
         return after.kind is _NAME
     return after.kind is _NAME and STATEMENT_PHRASES.get(tokens.current.key) == after.key
+
+
+def _starts_when(tokens: TokenStream, after: Token) -> bool:
+    """Whether WHEN begins a statement here: not where it gets a value, nor where all of it is a call."""
+    if after.key != "(":
+        return after.key not in (*ASSIGNMENT_SIGNS, "[")
+    depth, steps = 0, 1
+    while (token := tokens.peek(steps)).kind is not TokenKind.END:
+        depth += (token.key == "(") - (token.key == ")")
+        steps += 1
+        if not depth:
+            break
+    return tokens.peek(steps).key in _BEHIND_OPERAND
 
 
 def starts_return(tokens: TokenStream) -> bool:

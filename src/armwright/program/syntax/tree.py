@@ -310,6 +310,35 @@ class Pause(Node):
 
 
 @attrs.frozen
+class When(Node):
+    """``WHEN [name:] [PRIORITY number:] condition DO action``; ``head`` reaches up to DO."""
+
+    head: Span
+    name: Name | None
+    priority: Number | None
+    condition: Expression
+    action: "Statement"
+
+
+@attrs.frozen
+class WatchSwitch(Node):
+    """``WHEN name ON | OFF``."""
+
+    name: Name
+    on: bool
+
+
+@attrs.frozen
+class Brake(Node):
+    """``BRAKE``."""
+
+
+@attrs.frozen
+class Resume(Node):
+    """``RESUME``."""
+
+
+@attrs.frozen
 class Lock(Node):
     """``LOCK (variables) DO statement``; ``head`` reaches up to DO."""
 
@@ -376,6 +405,10 @@ ControlStatement: TypeAlias = (
     | Wait
     | WaitUntil
     | Pause
+    | When
+    | WatchSwitch
+    | Brake
+    | Resume
     | Lock
     | Try
     | Retry

@@ -83,7 +83,8 @@ def _enter(
     process.pc = procedure.start
 
 
-def _return(machine: Machine, process: Process, step: Instruction) -> None:
+def return_(machine: Machine, process: Process, step: Instruction) -> None:
+    """Leave a procedure or an action, and go on where it was begun."""
     process.pc = process.activation.return_address
     leave_activation(machine, process, step.span)
 
@@ -105,6 +106,7 @@ def leave_activation(machine: Machine, process: Process, span: Span) -> None:
     """Leave the present activation: its variables are gone, its locks given back."""
     activation = process.stack.pop()
     release_locks(machine, process, activation.lock_count)
+    process.forget_watches()
     for slot in activation.local_slots:
         kind = machine.state.types.pop(slot)
         elements = [name for name in machine.state.tree if name.startswith(f"{slot}[")] if kind.sizes else []
@@ -168,6 +170,6 @@ CALLS: Mapping[Op, Handler] = {
     Op.CALLF: _call_function,
     Op.RETV: _return_value,
     Op.NORET: _no_value,
-    Op.RET: _return,
+    Op.RET: return_,
 }
 _OF_FUNCTIONS = {**expressions.HANDLERS, **CALLS}

@@ -15,7 +15,7 @@ from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.language.source import Span
 from armwright.program.vm.collisions import check_others
 from armwright.program.vm.machine import Machine
-from armwright.program.vm.process import Motion, Process
+from armwright.program.vm.process import Motion, Process, StoppedOn
 from armwright.program.vm.recording import ToolWrenches, TrajectorySegment, peak_efforts, trajectory_efforts
 
 # A duration so little too short is rounding.
@@ -48,11 +48,19 @@ def stop_arm(machine: Machine, process: Process, span: Span) -> int:
     return end
 
 
+def rest_tick(machine: Machine, arm: str | None) -> int:
+    """Return when an arm is at rest that nobody moves [ticks]: it may still brake after an error that was recovered."""
+    runs = machine.state.segments.get(arm, ()) if arm is not None and machine.moving_process(arm) is None else ()
+    end = math.ceil((runs[-1].t0 + runs[-1].duration) / machine.cell.period - _ROUNDING) if runs else 0
+    return max(end, machine.state.ticks)
+
+
 def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     """Stop an arm in the middle of its stage; return how many ticks it takes."""
     arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.segments[motion.arm], machine.cell.period
     last = runs[-1]
-    braking = braked(arm, last.trajectory, local, period=period)
+    stop = braked(arm, last.trajectory, local, period=period)
+    braking, motion.stopped = stop.trajectory, StoppedOn(last.trajectory, stop.reached)
     tau = trajectory_efforts(arm, braking, period, _send_and_watch(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
@@ -181,7 +189,7 @@ def _minimum_depth(machine: Machine, motion: Motion) -> float | None:
     trajectory, local = motion.first_contact
     cell_arm, period = machine.cell.arms[motion.arm], machine.cell.period
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
-    braking = braked(cell_arm.arm, trajectory, tick, period=period)
+    braking = braked(cell_arm.arm, trajectory, tick, period=period).trajectory
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
     X_WT = machine.base_pose(motion.arm) @ forward(cell_arm.arm, q) @ motion.X_HM
     return machine.cell.contact.height - float(X_WT[:, 2, 3].min())

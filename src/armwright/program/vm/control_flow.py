@@ -1,6 +1,5 @@
 """Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
 
-import math
 from collections.abc import Mapping, Sequence
 
 import attrs
@@ -8,7 +7,7 @@ import attrs
 from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.language.source import Span
 from armwright.program.vm.calls import CALLS, leave_activation
-from armwright.program.vm.contact import contact_report, record_contact, stop_arm
+from armwright.program.vm.contact import contact_report, record_contact, rest_tick, stop_arm
 from armwright.program.vm.machine import MAX_PAUSE, Handler, Machine, RunError, jump_target
 from armwright.program.vm.move import halt_motion
 from armwright.program.vm.process import (
@@ -21,15 +20,15 @@ from armwright.program.vm.process import (
 )
 from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
 from armwright.program.vm.wait_until import too_late, wait_until, wait_within
-
-# A time this part of a period behind a tick is on it.
-_ROUNDING = 1e-9
-
+from armwright.program.vm.watches import WATCHES, abandon_interrupted
 
 # ---- processes -----------------------------------------------------------------------------------------------------
 
 
 def _fork(machine: Machine, process: Process, step: Instruction) -> None:
+    if process.interruption is not None and any(branch in machine.state.processes for branch in process.branches):
+        text = "the action of a WHEN begins a COBEGIN while it interrupts another"
+        raise machine.error(process, "E503", text, step.span, "the branches of that one still run")
     parent = process.activation
     names, temporaries, spans = parent.bindings, parent.temporaries, parent.temporary_spans
     _check_process_limit(machine, process, step)
@@ -74,14 +73,16 @@ def _quit(machine: Machine, process: Process, step: Instruction) -> None:  # noq
     assert parent is not None  # noqa: S101 - only branches end so
     if all(branch.done for branch in parent.branches):
         parent.branches = []
-        parent.waiting, parent.wake_tick = None, machine.state.ticks
+        if parent.waiting is not None and parent.waiting.kind == "branches":
+            # The action of a WHEN goes on as it does, and finds that there is nothing more to wait for.
+            parent.waiting, parent.wake_tick = None, machine.state.ticks
 
 
 def end_process(machine: Machine, process: Process) -> None:
     """Take a process out of the run."""
     abandon_wait(machine, process)
     release_locks(machine, process, 0)
-    process.done = True
+    process.done, process.watches = True, []
     process.motion = process.pending_effect = None
     # Where the branch after it could not begin, its COBEGIN has let none go.
     if process in machine.state.processes:
@@ -102,7 +103,8 @@ def _pause(machine: Machine, process: Process, step: Instruction) -> None:
 
 def _try(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     kinds = tuple(map(str, step.operands[1:]))
-    attempt = TryBlock(process.pc - 1, jump_target(step, 0), False, len(process.locks), kinds)
+    held, watches = len(process.locks), len(process.watches)
+    attempt = TryBlock(process.pc - 1, jump_target(step, 0), False, held, kinds, watches)
     process.activation.try_blocks.append(attempt)
 
 
@@ -120,13 +122,15 @@ def _retry(machine: Machine, process: Process, step: Instruction) -> None:  # no
     while not try_blocks[-1].recovering:
         try_blocks.pop()
     release_locks(machine, process, try_blocks[-1].lock_count)
+    del process.watches[try_blocks[-1].watch_count :]
     # TRY itself is run again and puts the attempt back.
     process.pc = try_blocks.pop().start
 
 
 def _halt(machine: Machine, process: Process, step: Instruction) -> None:
-    """End the program; in a procedure that an action calls, the MOVE of that action, as in the action itself."""
-    if not any(activation.kind == "action" for activation in process.stack):
+    """End the program; in a procedure that the action of an ON calls, its MOVE alone, as in the action itself."""
+    inner = next((one.kind for one in reversed(process.stack) if one.kind in ("action", "watch")), "watch")
+    if inner == "watch":
         finish_program(machine, process, step.span, "HALT")
         return
     while process.activation.kind != "action":
@@ -147,7 +151,7 @@ def shut_down(machine: Machine, span: Span) -> list[str]:
     for process in machine.state.processes:
         abandon_wait(machine, process)
     ends = [_stop_motion(machine, process, span) for process in machine.state.processes]
-    machine.state.ticks = max([*ends, *(_rest_tick(machine, arm) for arm in machine.state.segments)])
+    machine.state.ticks = max([*ends, *(rest_tick(machine, arm) for arm in machine.state.segments)])
     switched_off = sorted(machine.hardware.active_devices())
     for device in switched_off:
         machine.hardware.operate(device, on=False)
@@ -155,11 +159,22 @@ def shut_down(machine: Machine, span: Span) -> list[str]:
     return switched_off
 
 
-def _stop_motion(machine: Machine, process: Process, span: Span) -> int:
-    """Give up the motion of a process, if it makes one; return when its arm is at rest [ticks]."""
-    if process.motion is None:
-        return _rest_tick(machine, process.last_arm)
-    motion, end = process.motion, stop_arm(machine, process, span)
+def _stop_motion(machine: Machine, process: Process, span: Span, inside: int = 0) -> int:
+    """Give up the motion of a process, if it makes one; return when its arm is at rest [ticks].
+
+    Args:
+        machine: that runs the program.
+        process: the process.
+        span: what ends the motion.
+        inside: how many of its activations stay. What the action of a WHEN among them has interrupted is kept.
+    """
+    for activation in process.stack[inside:]:
+        if activation.interrupted is not None:
+            abandon_interrupted(machine, process, activation.interrupted)
+    motion = process.motion
+    if motion is None or any(one.kind == "watch" for one in process.stack[motion.stack_depth : inside]):
+        return rest_tick(machine, process.last_arm)
+    end = stop_arm(machine, process, span)
     record_contact(machine, motion, end)
     contact_text, contact = contact_report(motion)
     process.motion, arm = None, motion.arm
@@ -168,13 +183,6 @@ def _stop_motion(machine: Machine, process: Process, span: Span) -> int:
     data = {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", motion.trace_text, motion.span, since=since, until=end, arm=arm, data=data)
     return end
-
-
-def _rest_tick(machine: Machine, arm: str | None) -> int:
-    """Return when an arm is at rest that nobody moves [ticks]: it may still brake after an error that was recovered."""
-    runs = machine.state.segments.get(arm, ()) if arm is not None and machine.moving_process(arm) is None else ()
-    end = math.ceil((runs[-1].t0 + runs[-1].duration) / machine.cell.period - _ROUNDING) if runs else 0
-    return max(end, machine.state.ticks)
 
 
 def finish_program(machine: Machine, process: Process, span: Span, word: str) -> None:
@@ -203,12 +211,14 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         ends = [_cancel_branch(machine, branch, span) for branch in process.branches]
         process.branches = []
         # The arm of the branch that failed may be the last to come to rest.
-        process.wake_tick = at_rest = max([at_rest, *ends, _stop_motion(machine, process, span)])
+        kept = _recovering_activation(process, error.kind)
+        process.wake_tick = at_rest = max([at_rest, *ends, _stop_motion(machine, process, span, kept)])
         abandon_wait(machine, process)
         process.pending_effect = None
         if (try_block := _unwind_to_recovery(machine, process, span, error.kind)) is not None:
             process.pc, process.message = try_block.recovery, error.diagnostic.message
             release_locks(machine, process, try_block.lock_count)
+            del process.watches[try_block.watch_count :]
             code, line = error.diagnostic.code, machine.code.source.place(span.start)
             text = f"{code} in line {line}: {error.diagnostic.message}"
             machine.record_effect(process, "ERROR", text, span, data={"code": code, "kind": error.kind})
@@ -217,6 +227,14 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
             machine.state.ticks = process.wake_tick
             return False
         process = process.parent
+
+
+def _recovering_activation(process: Process, kind: str) -> int:
+    """Return how many activations stay when a process recovers from a kind of error; 0 where it does not."""
+    for depth in range(len(process.stack), 0, -1):
+        if any(block.recovers_from(kind) for block in process.stack[depth - 1].try_blocks):
+            return depth
+    return 0
 
 
 def _unwind_to_recovery(machine: Machine, process: Process, span: Span, kind: str) -> TryBlock | None:
@@ -228,7 +246,7 @@ def _unwind_to_recovery(machine: Machine, process: Process, span: Span, kind: st
         try_blocks = process.activation.try_blocks
         while try_blocks:
             try_block = try_blocks.pop()
-            if not try_block.recovering and (not try_block.kinds or kind in try_block.kinds):
+            if try_block.recovers_from(kind):
                 try_blocks.append(attrs.evolve(try_block, recovering=True))
                 return try_block
         if len(process.stack) == 1:
@@ -248,6 +266,7 @@ def _cancel_branch(machine: Machine, process: Process, span: Span) -> int:
 
 HANDLERS: Mapping[Op, Handler] = {
     **CALLS,
+    **WATCHES,
     Op.FORK: _fork,
     Op.JOIN: _join,
     Op.QUIT: _quit,

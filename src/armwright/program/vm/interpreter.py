@@ -28,6 +28,7 @@ from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_wa
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
+from armwright.program.vm.watches import is_stuck, judge_watches
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
 _UNRECOVERABLE = ("E504", "E506")
@@ -98,13 +99,14 @@ def next_process(machine: Machine) -> Process:
 
 def ready_process(machine: Machine) -> Process | None:
     """Return the process that is served next; None where all wait for one another."""
-    best = None
+    best: tuple[tuple[int, float, tuple[int, ...]], Process] | None = None
     for process in machine.state.processes:
         if (due := process.due_tick) is not None:
             rank = (due, -process.priority, process.path)
             if best is None or rank < best[0]:
                 best = (rank, process)
-    return None if best is None else best[1]
+    # Who waits for others is served for its WHENs alone; where these can change nothing, all wait for ever.
+    return None if best is None or (best[1].waiting is not None and is_stuck(machine)) else best[1]
 
 
 def advance(machine: Machine, process: Process) -> None:
@@ -118,7 +120,8 @@ def advance(machine: Machine, process: Process) -> None:
         if mishap is not None:
             process = _affected_process(machine, mishap) or process
             raise _mishap_error(machine, process, mishap)
-        _advance(machine, process)
+        if not judge_watches(machine, process):
+            _advance(machine, process)
     except RunError as error:
         if not _is_recoverable(machine, error) or not recover(machine, process, error):
             raise _stopped_error(machine, error, process, process.last_arm) from None

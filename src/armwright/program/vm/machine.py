@@ -382,6 +382,7 @@ class Machine:
             RunError: there have been too many without any time going by.
         """
         self.state.idle_steps += 1
+        self.state.step_tick = self.state.ticks
         if self.state.idle_steps > self.limits.steps:
             text = f"the program has executed {self.limits.steps} steps, and no time has passed"
             help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"

@@ -24,6 +24,7 @@ from armwright.program.vm.contact import (
     contact_report,
     record_contact,
     refuse_contact,
+    rest_tick,
     send_trajectory,
     stop_arm,
     update_depth_alarm,
@@ -31,7 +32,7 @@ from armwright.program.vm.contact import (
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
-from armwright.program.vm.process import EarlyEnd, Guard, Motion, Process
+from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
 from armwright.spatial.poses import inverse
@@ -47,6 +48,10 @@ _STEPS_PER_MOVE = 1000
 def move(machine: Machine, process: Process, step: Instruction) -> None:
     """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
     if process.motion is not None and not _finish_enclosing_move(machine, process, process.motion, step.span):
+        return
+    if process.interruption is not None and (rest := rest_tick(machine, process.last_arm)) > machine.state.ticks:
+        # It interrupts a process whose arm still brakes after an error.
+        process.pc, process.wake_tick = process.pc - 1, rest
         return
     request = move_request(machine, process, step)
     moved = machine.resolve_name(process, request.begin.operands[0])
@@ -74,7 +79,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         start=machine.next_start(),
         guards=request.guards,
     )
-    _start_stage(machine, process, process.motion)
+    start_stage(machine, process, process.motion)
 
 
 def advance_motion(machine: Machine, process: Process) -> None:
@@ -93,9 +98,9 @@ def advance_motion(machine: Machine, process: Process) -> None:
         is_guarded = not all(guard.triggered for guard in motion.guards)
         process.wake_tick = machine.state.ticks + 1 if is_guarded else motion.stage_end_tick
     elif motion.stages:
-        _start_stage(machine, process, motion)
+        start_stage(machine, process, motion)
     else:
-        _finish_move(machine, process, motion)
+        finish_move(machine, process, motion)
 
 
 def halt_motion(machine: Machine, process: Process, step: Instruction) -> None:
@@ -103,25 +108,46 @@ def halt_motion(machine: Machine, process: Process, step: Instruction) -> None:
     motion, action = process.motion, process.stack.pop()
     assert action.kind == "action"  # noqa: S101 - procedures that it called have been left
     release_locks(machine, process, action.lock_count)
+    process.forget_watches()
     process.pc = action.return_address
     if motion is None:
         # An error has stopped the arm before, and a TRY in the action has gone on from there.
         return
-    _stop_motion(machine, process, motion, step.span)
+    stop_motion(machine, process, motion, step.span)
 
 
-def _stop_motion(machine: Machine, process: Process, motion: Motion, span: Span) -> None:
+def stop_motion(machine: Machine, process: Process, motion: Motion, span: Span) -> None:
+    """End a motion before its goal: its arm comes to rest, or is at rest already."""
     motion.stage_end_tick = process.wake_tick = stop_arm(machine, process, span)
     motion.stages, motion.guards = [], []
     motion.early_end = EarlyEnd.HALTED
 
 
+def brake_motion(machine: Machine, process: Process, interruption: Interruption, span: Span) -> None:
+    """Bring the arm of a MOVE that a WHEN has interrupted to rest on its path, and let the process wait for that."""
+    motion = process.motion
+    assert motion is not None  # noqa: S101 - asked for only then
+    if motion.rest_tick is None:
+        end = stop_arm(machine, process, span)
+        interruption.braked = True
+        machine.record_effect(process, "BRAKE", f"{motion.arm} BRAKE", span, until=end, arm=motion.arm)
+    assert motion.rest_tick is not None  # noqa: S101 - it is being stopped
+    process.wake_tick = max(machine.state.ticks, motion.rest_tick)
+
+
 def _finish_enclosing_move(machine: Machine, process: Process, motion: Motion, span: Span) -> bool:
-    """Whether the MOVE around an action is over, so that another can begin; its arm is brought to rest before."""
-    if motion.early_end is EarlyEnd.HALTED:
-        _finish_move(machine, process, motion)
+    """Whether another MOVE can begin in an action: the arm is at rest, and the MOVE around it over or put aside."""
+    if (interruption := process.interruption_of(motion)) is not None:
+        brake_motion(machine, process, interruption, span)
+        if process.wake_tick > machine.state.ticks:
+            process.pc -= 1
+            return False
+        interruption.motion, process.motion = motion, None
         return True
-    _stop_motion(machine, process, motion, span)
+    if motion.early_end is EarlyEnd.HALTED:
+        finish_move(machine, process, motion)
+        return True
+    stop_motion(machine, process, motion, span)
     # When the arm is at rest the same instruction is looked at again.
     process.pc -= 1
     return False
@@ -261,7 +287,7 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
 # ---- meanwhile ----------------------------------------------------------------------------------------------------
 
 
-def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
+def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
     check_late_stage(machine, process, motion)
     (stage, goal_names, _, clearance, path), period = motion.stages.pop(0), machine.cell.period
@@ -320,7 +346,7 @@ def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: 
     return bool(activation.temporaries[guard.result])
 
 
-def _finish_move(machine: Machine, process: Process, motion: Motion) -> None:
+def finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     """The MOVE is over: the frame table and the trace know where the arm is."""
     arm = motion.arm
     machine.update_hand_pose(arm, motion.span)

@@ -12,7 +12,7 @@ from armwright.program.vm.process import Guard, Process
 # The longest MOVE; more is a slip of units [s].
 _MAX_DURATION = 1e6
 # What may take a pose: of the operations in a condition all others take numbers.
-_READS_POSES = {op for op in Op if set("Pvtx") & set(op.signature.partition("=")[2] or op.signature)}
+READS_POSES = {op for op in Op if set("Pvtx") & set(op.signature.partition("=")[2] or op.signature)}
 
 
 class Goal(NamedTuple):
@@ -112,7 +112,7 @@ def _clause_value(machine: Machine, process: Process, part: Instruction) -> floa
     return value * machine.code.units.metres if part.op is Op.MVBLD else value
 
 
-def _operations(code: Code, condition: int) -> set[Op]:
+def operations(code: Code, condition: int) -> set[Op]:
     """Return the operations of a condition, those of the functions that it calls among them."""
     ops: set[Op] = set()
     starts = [condition]
@@ -126,11 +126,11 @@ def _operations(code: Code, condition: int) -> set[Op]:
 
 def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, action = jump_target(part, 0), jump_target(part, 2)
-    ops = _operations(machine.code, condition)
+    ops = operations(machine.code, condition)
     return Guard(
         condition=condition,
         result=str(part.operands[1]),
         action=action,
-        reads_pose=not ops.isdisjoint(_READS_POSES),
+        reads_pose=not ops.isdisjoint(READS_POSES),
         reads_force=Op.FORCE in ops,
     )

@@ -54,6 +54,7 @@ class TryBlock:
         recovering: whether that part is running.
         lock_count: how many locks the process held when it began.
         kinds: of the errors that it recovers from; empty for all.
+        watch_count: how many WHENs the process had armed or disarmed when it began.
     """
 
     start: int
@@ -61,11 +62,16 @@ class TryBlock:
     recovering: bool
     lock_count: int
     kinds: tuple[str, ...] = ()
+    watch_count: int = 0
+
+    def recovers_from(self, kind: str) -> bool:
+        """Whether it recovers from a kind of error: not where it has failed already."""
+        return not self.recovering and (not self.kinds or kind in self.kinds)
 
 
 @attrs.define
 class Activation:
-    """One run of a procedure, of the main program, or of a condition or action inside a motion.
+    """One run of a procedure, of the main program, of a condition or action inside a motion, or of that of a WHEN.
 
     Attributes:
         kind: what it is.
@@ -75,13 +81,14 @@ class Activation:
         temporary_spans: the part of the program that gave each of them.
         return_address: the instruction to go on with afterwards.
         try_blocks: the TRYs it is in, innermost last.
-        call_span: the statement that called it; of an action, its MOVE.
+        call_span: the statement that called it; of an action, its MOVE; of that of a WHEN, what it interrupts.
         local_slots: where its own variables are kept, gone with it.
         lock_count: how many locks the process held when it began.
         result: where the value of a function goes.
+        interrupted: what the action of a WHEN has interrupted; None for others.
     """
 
-    kind: Literal["main", "procedure", "condition", "action"]
+    kind: Literal["main", "procedure", "condition", "action", "watch"]
     name: str = ""
     bindings: dict[str, str] = attrs.field(factory=dict)
     temporaries: dict[str, Value] = attrs.field(factory=dict)
@@ -92,8 +99,9 @@ class Activation:
     local_slots: tuple[str, ...] = ()
     lock_count: int = 0
     result: str = ""
+    interrupted: Interruption | None = None
 
-    def create_nested(self, kind: Literal["condition", "action"], **fields: Any) -> Activation:
+    def create_nested(self, kind: Literal["condition", "action", "watch"], **fields: Any) -> Activation:
         """Return the activation of a condition or an action, which has the names of this one."""
         names, temporaries, spans = self.bindings, self.temporaries, self.temporary_spans
         return Activation(kind=kind, bindings=names, temporaries=temporaries, temporary_spans=spans, **fields)
@@ -118,6 +126,77 @@ class Guard:
     reads_pose: bool
     reads_force: bool = False
     triggered: bool = False
+
+
+@attrs.define
+class Watch:
+    """A ``WHEN condition DO action`` that a process has armed.
+
+    Attributes:
+        start: its instruction, which tells it from others.
+        name: that the program gives it; empty where it has none.
+        text: its name, or else its condition, for people.
+        priority: the larger is served first, and interrupts the smaller.
+        condition: first instruction of the condition.
+        result: the value in passing that it leaves.
+        action: first instruction of the action.
+        activation: whose names it sees.
+        depth: how many activations its process had when it was armed.
+        reads_pose: whether the condition checks poses.
+        reads_outside: whether it reads what changes by itself: the time, inputs, outputs, forces.
+        armed: whether it is judged.
+        holds: whether its condition held when it was judged last.
+        due: whether its action is to be run.
+    """
+
+    start: int
+    name: str
+    text: str
+    priority: float
+    condition: int
+    result: str
+    action: int
+    activation: Activation
+    depth: int
+    reads_pose: bool
+    reads_outside: bool
+    armed: bool = True
+    holds: bool = False
+    due: bool = False
+
+
+@attrs.define
+class Interruption:
+    """What the action of a WHEN has interrupted, to go on with afterwards.
+
+    Attributes:
+        title: of the WHEN, for people.
+        priority: of the WHEN.
+        wake_tick: when the process was to go on [ticks].
+        waiting: why it did not go on.
+        unfulfilled_wait: the event, the locks or the condition that it had not got.
+        pending_effect: what was to take effect at ``wake_tick``.
+        last_arm: named or moved last.
+        motion: the MOVE that was put aside for a MOVE of the action; None where none was.
+        braked: whether the action has braked the MOVE, and not resumed it.
+    """
+
+    title: str
+    priority: float
+    wake_tick: int
+    waiting: WaitReason | None
+    unfulfilled_wait: WaitReason | None
+    pending_effect: PendingEffect | None
+    last_arm: str | None
+    motion: Motion | None = None
+    braked: bool = False
+
+
+class StoppedOn(NamedTuple):
+    """Where a stage was stopped: its trajectory, and the time on that whose position the arm comes to rest at [s]."""
+
+    trajectory: Trajectory
+    reached: float
 
 
 class PendingStage(NamedTuple):
@@ -187,6 +266,7 @@ class Motion:
         deepest_contact: the deepest contact so far.
         paths: the paths past other bodies that were planned for its stages.
         early_end: what ended it before its goal; None where nothing did.
+        stopped: where its present stage was stopped; None where that runs, or is at its end.
     """
 
     arm: str
@@ -212,6 +292,7 @@ class Motion:
     deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
     paths: tuple[PlannedPath, ...] = ()
     early_end: EarlyEnd | None = None
+    stopped: StoppedOn | None = None
 
     @property
     def trace_text(self) -> str:
@@ -294,6 +375,8 @@ class Process:
         branches: processes begun and not yet joined.
         done: whether it has ended.
         message: of the error that it recovered from last.
+        watches: the WHENs of the blocks that it is in, in the order of arming.
+        judged_tick: when it has judged them last [ticks].
     """
 
     path: tuple[int, ...] = ()
@@ -311,6 +394,8 @@ class Process:
     branches: list[Process] = attrs.field(factory=list)
     done: bool = False
     message: str = ""
+    watches: list[Watch] = attrs.field(factory=list)
+    judged_tick: int = -1
 
     @property
     def activation(self) -> Activation:
@@ -319,7 +404,18 @@ class Process:
 
     @property
     def due_tick(self) -> int | None:
-        """When it is served next [ticks], or its arm has to be stopped; None where it waits for others."""
+        """When it is served next [ticks]: to go on, or to judge its WHENs; None where it waits for others."""
+        due, judge = self.work_tick, self.judge_tick
+        return due if judge is None else judge if due is None else min(due, judge)
+
+    @property
+    def judge_tick(self) -> int | None:
+        """When it is to judge its WHENs next [ticks]; None where none is armed."""
+        return self.judged_tick + 1 if any(watch.armed for watch in self.watches) else None
+
+    @property
+    def work_tick(self) -> int | None:
+        """When it goes on, or its arm has to be stopped [ticks]; None where it waits for others."""
         motion, wake = self.motion, None if self.waiting is not None else self.wake_tick
         alarm = None if motion is None else motion.alarm_tick
         threat = None if motion is None or motion.threat is None else motion.threat.tick
@@ -334,9 +430,24 @@ class Process:
     def followed_motion(self) -> Motion | None:
         """The MOVE that is followed now; None in an action of it, or in a procedure that an action calls."""
         motion = self.motion
-        if motion is None or any(activation.kind == "action" for activation in self.stack[motion.stack_depth :]):
+        if motion is None or any(one.kind in ("action", "watch") for one in self.stack[motion.stack_depth :]):
             return None
         return motion
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """What the innermost action of a WHEN that it is in has interrupted; None outside of such actions."""
+        return next((one.interrupted for one in reversed(self.stack) if one.interrupted is not None), None)
+
+    def interruption_of(self, motion: Motion) -> Interruption | None:
+        """What interrupts a motion, where that is the action of a WHEN; None where it is one of an ON, or nothing."""
+        inner = (one for one in reversed(self.stack[motion.stack_depth :]) if one.kind in ("action", "watch"))
+        return next((one.interrupted for one in inner), None)
+
+    def forget_watches(self) -> None:
+        """Disarm the WHENs of activations that have been left."""
+        if self.watches:
+            self.watches = [watch for watch in self.watches if watch.depth <= len(self.stack)]
 
     def descends_from(self, other: Process) -> bool:
         """Whether another process began this one, directly or through others, or is this one."""

@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Activation, Guard, Motion, Process
+from armwright.program.vm.process import Activation, Guard, Interruption, Motion, Process, Watch
 from armwright.program.vm.recording import Effect, RunStage, ToolWrenches, TrajectorySegment
 
 
@@ -51,6 +51,7 @@ class MachineState:
         hands: the gripper of each arm.
         ticks: the time, in servo periods.
         idle_steps: instructions since time went by.
+        step_tick: when the last instruction was done [ticks].
         activation_count: procedures called so far.
         start_count: what takes time and was begun so far.
         has_ended: whether the program has ended.
@@ -81,6 +82,7 @@ class MachineState:
     stages: list[RunStage] = attrs.field(factory=list)
     ticks: int = 0
     idle_steps: int = 0
+    step_tick: int = 0
     activation_count: int = 0
     start_count: int = 0
     has_ended: bool = False
@@ -120,7 +122,7 @@ class MachineState:
 
 
 # What changes while a program runs.
-_MUTABLE = (MachineState, Process, Activation, Motion, Guard, Hand, list, dict)
+_MUTABLE = (MachineState, Process, Activation, Watch, Interruption, Motion, Guard, Hand, list, dict)
 
 
 def _copy(value: Any, copies: dict[int, Any]) -> Any:

@@ -113,7 +113,9 @@ def deadlock_error(machine: Machine) -> RunError:
         locks = process.waiting.kind == "locks"
         holders = {holder for name in process.waiting.names if locks for holder in _lock_holders(machine, name)}
         locked = ", ".join(holder.title for holder in sorted(holders - {process}, key=lambda holder: holder.path))
-        text = f"{process.title} waits for {'the lock of ' if locks else ''}{names}"
+        running = process.interruption
+        title = process.title if running is None else f"{running.title} of {process.title}"
+        text = f"{title} waits for {'the lock of ' if locks else ''}{names}"
         texts.append(Label(process.waiting.span, f"{text}, held by {locked}" if locked else text))
     first, *others = texts
     text = f"{len(texts)} processes wait for ever" if others else "the program waits for ever"
