@@ -10,6 +10,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
+from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certificate import Certificate
@@ -58,6 +59,7 @@ class StageGoal:
     Attributes:
         kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
+        joints: (n,) joint positions that a ``PTP`` is to end at, whose pose ``poses`` has; None for any that take it.
         blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
         corner: how far a ``SPLINE`` may be off the straight legs, and pass a pose [m]; None for the report's own
             X-spline through the poses.
@@ -65,6 +67,7 @@ class StageGoal:
 
     kind: StageKind
     poses: Array
+    joints: Array | None = None
     blend: float | None = None
     corner: float | None = None
 
@@ -205,6 +208,12 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
     if far.max() > _FARTHEST:
         worst = int(far.argmax())
         raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
+    if goal.kind == "PTP" and goal.joints is not None:
+        for violation in violations_of(solver_of(arm).arm, goal.joints.tolist()):
+            obstacle = _at_pose("limits", str(violation), 0, poses[0])
+            raise StageError(number, attrs.evolve(obstacle, joint=violation.joint))
+        yield _direct(arm, q, goal.joints, manner)
+        return
     if goal.kind == "PTP":
         # Planned as they are asked for: nearly always the first one does.
         yield from (_direct(arm, q, end, manner) for end in _configurations(arm, poses[0], q, number))

@@ -109,6 +109,8 @@ class Op(enum.StrEnum):
     MVBEG = "MVBEG", "FP"  # moved, goal: a motion begins
     MVDIR = "MVDIR", ""  # the shortest way in joint space
     MVSTR = "MVSTR", ""  # one straight line
+    MVJNT = "MVJNT", "N+"  # numbers: the goal is these joint positions, whatever MVBEG says of it
+    MVTGT = "MVTGT", "w"  # joint target of the cell: the goal is that
     MVVIA = "MVVIA", "P+"  # frames: through these without a stop
     MVAPP = "MVAPP", "P"  # frame: approach point
     MVDEP = "MVDEP", "P"  # frame: departure point
@@ -147,6 +149,15 @@ class Op(enum.StrEnum):
     STOP = "STOP", ""  # end of the text
     PRINT = "PRINT", "t+"  # values and texts
     LOG = "LOG", "sst+"  # name, titles of the columns as a line of CSV, values and texts
+
+
+# What may stand between MVBEG and MVEND.
+MOVE_PARTS = frozenset(
+    (
+        *(Op.MVDIR, Op.MVSTR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
+        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
+    )
+)
 
 
 @attrs.frozen

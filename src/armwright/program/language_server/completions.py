@@ -29,7 +29,7 @@ from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS, WITH_INPUT
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, MEASURES, WITH_AXIS, WITH_INPUT
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -93,6 +93,7 @@ class _OperandRule:
         arms: whether an arm may.
         devices: whether a device may.
         inputs: whether an input may.
+        targets: whether a joint target may.
         functions: which functions of the language may.
         values: which values of the language may.
         words: other words with a meaning at this position.
@@ -102,6 +103,7 @@ class _OperandRule:
     arms: bool = False
     devices: bool = False
     inputs: bool = False
+    targets: bool = False
     functions: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
@@ -114,7 +116,7 @@ _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCAL
 _ANY_VALUE = _OperandRule(
     kinds=frozenset(VariableKind) - {VariableKind.EVENT},
     arms=True,
-    functions=tuple(FUNCTIONS),
+    functions=tuple(name for name in FUNCTIONS if name != JOINTS),
     values=tuple(sorted(VALUES)),
 )
 _NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
@@ -164,6 +166,7 @@ _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
         for name, signature in FUNCTIONS.items()
         if signature.argument_types == ACCEPTED_TYPES[ExpressionType.SCALAR]
     },
+    JOINTS: attrs.evolve(_NUMBER, targets=True),
 }
 
 
@@ -215,6 +218,8 @@ def _operand_rule(expected: ExpectedTokens, tokens: Sequence[Token], scope: Scop
     elif rule is None:
         # Behind a comma stands a number of a matrix.
         rule = _NUMBER if tokens[-1].key == "," else _rule_of_type(scope.type(expected.assignment_target))
+    if operand == "a pose" and where == "after TO" and call is None:
+        rule = attrs.evolve(rule, functions=(JOINTS,))
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
         return _STEP if VariableKind.FRAME in rule.kinds else _TRANS if VariableKind.TRANS in rule.kinds else rule
@@ -329,7 +334,10 @@ class _ItemFactory:
             yield self._item(name, Kind.Constant, "", arms[name])
 
     def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
-        """Give the devices of the cell."""
+        """Give the devices, inputs and joint targets of the cell."""
+        if operand.targets and self._analysis.cell is not None:
+            for name, target in sorted(self._analysis.cell.joint_targets.items()):
+                yield self._item(self._match_case(name), Kind.Property, "", f"joint target of {target.arm}")
         if operand.inputs and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.wiring.inputs):
                 yield self._item(self._match_case(name), Kind.Property, "", "input")

@@ -106,6 +106,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = signature(procedure.node)[0], [f"declared in line {line}"]
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
+        case NameKind.TARGET:
+            description = text, [_describe_target(analysis, key)]
         case NameKind.UNIT if key in UNITS:
             description = key, [f"a unit of {dimension(key)}"]
         case NameKind.ERROR:
@@ -183,6 +185,18 @@ def _describe_device(analysis: Analysis, key: str) -> str:
     if cell is None or cell.devices is None:
         return "a device"
     return f"a device of {cell.name}" if key in cell.devices else f"{cell.name} has no such device"
+
+
+def _describe_target(analysis: Analysis, key: str) -> str:
+    cell = analysis.cell
+    if cell is None:
+        return "a joint target of the cell"
+    if key not in cell.joint_targets:
+        return f"{cell.name} has no such joint target"
+    target, units = cell.joint_targets[key], analysis.compiled.symbols.units
+    worth = [units.radians if it.revolute else units.metres for it in cell.arms[target.arm].arm.joints]
+    positions = ", ".join(f"{q / unit:.6g}" for q, unit in zip(target.q.tolist(), worth, strict=True))
+    return f"a joint target of {target.arm} in {cell.name}: JOINTS({positions})"
 
 
 def _parent_text(frame: str) -> str:

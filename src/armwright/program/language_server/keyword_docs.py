@@ -181,6 +181,11 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "TRUE": ("TRUE", "The condition that holds."),
     "FALSE": ("FALSE", "The condition that does not hold."),
     "TIME": ("TIME", "The time on the clock of the cell since the program began, in seconds."),
+    # motion by joints
+    "JOINTS": (
+        "JOINTS (q1, q2, ...) | JOINTS (target)",
+        "The goal of a MOVE by the position of each joint, an angle or a length, or by a joint target of the cell.",
+    ),
     # sensors
     "INPUT": ("INPUT (name)", "A condition: whether a digital input of the cell is on."),
     "ANALOG": ("ANALOG (name)", "The number of an analogue input of the cell."),

@@ -2,8 +2,9 @@
 
 from armwright.program.language.diagnostic import labels
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
+from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.context import Checks, Context
-from armwright.program.semantics.expression_types import ExpressionType, expression_text
+from armwright.program.semantics.expression_types import ExpressionType, expression_text, quote_expression
 from armwright.program.semantics.quantities import check_range, check_unit
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.type_check import require_condition, require_quantity, require_type
@@ -24,7 +25,10 @@ def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
     require_type(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
-    _check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
+    if isinstance(node.goal, tree.Function) and is_joints(names.scope, node.goal):
+        _check_joints(names, node, node.goal)
+    else:
+        _check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
     _check_combination(names, node.clauses)
     for clause in node.clauses:
         match clause:
@@ -59,6 +63,29 @@ def _check_pose(
         return f"to move by `{step}` from the present pose write `MOVE {moved} TO {moved} * {step}`"
 
     require_type(names, node, ExpressionType.FRAME, code, what, advice=advice)
+
+
+# What JOINTS as a goal has nothing to do with: only the joints know where they go.
+_CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Via, tree.Approach)
+
+
+def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> None:
+    """Check a goal that is given by joint positions: what goes to it, and how."""
+    if joint_target(names.scope, goal) is None:
+        if not goal.arguments:
+            names.report("E242", "JOINTS takes a position for each joint", goal.span, "no positions here")
+        for argument in goal.arguments:
+            require_type(names, argument, ExpressionType.SCALAR, "E216", "a joint position is a number")
+    if not isinstance(node.moved, tree.ArmName | tree.Poison):
+        text = f"JOINTS is a goal for an arm, not for {quote_expression(node.moved)}"
+        advice = "move the arm that carries it"
+        names.report("E241", text, node.moved.span, "this is not an arm", advice=advice)
+    for clause in node.clauses:
+        if isinstance(clause, _CONFLICTS_WITH_JOINTS):
+            word = tree.clause_word(type(clause))
+            text, here = f"{word} cannot be combined with JOINTS", labels(goal.span, "joint positions given here")
+            advice = "let one MOVE go to a frame, and the next to JOINTS"
+            names.report("E241", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
 
 
 def _check_speed(names: NameResolver, node: tree.Expression) -> None:

@@ -9,11 +9,19 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
-from armwright.errors import IncapableArmError
+from armwright.errors import IncapableArmError, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
-from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text
+from armwright.program.bytecode.instructions import (
+    MOVE_PARTS,
+    Instruction,
+    MotionKind,
+    Op,
+    StagePlan,
+    stages_of,
+    stages_text,
+)
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
@@ -65,7 +73,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         X_HM=machine.state.tree.relation(moved, arm),
         span=step.span,
         text=f"{subject} MOVE: {stages_text(request.form).replace(' / ', '; ')} {speed_text}",
-        goal=machine.variable_name(process, request.begin.operands[1]) or request.form.goal,
+        goal=_goal_name(machine, process, request),
         implied_affix=implied,
         stages=stages,
         paths=tuple(stage.path for stage in stages if stage.path is not None),
@@ -130,6 +138,13 @@ def _finish_enclosing_move(machine: Machine, process: Process, motion: Motion, s
 # ---- planning ------------------------------------------------------------------------------------------------------
 
 
+def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
+    """Return the frame that a MOVE goes to, or the expression of it."""
+    if request.joints is not None:
+        return request.form.goal
+    return machine.variable_name(process, request.begin.operands[1]) or request.form.goal
+
+
 def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
     """Return the arm that carries what is moved, and whether it hangs there only from now on."""
     if is_arm(moved):
@@ -176,10 +191,18 @@ def _plan_stages(
     plans = stages_of(request.form)
     X_BW = inverse(machine.base_pose(arm))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
+    joints = _goal_joints(machine, process, request, arm)
+
+    def pose(label: str) -> Array:
+        if joints is not None and label == request.form.goal:
+            return forward(cell_arm.arm, joints)
+        return X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH
+
     goals = [
         StageGoal(
             kind=legs.kind.value,
-            poses=np.stack([X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
+            poses=np.stack([pose(label) for label in legs.frames]),
+            joints=joints if request.form.goal in legs.frames else None,
             blend=request.blend,
             corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
@@ -196,6 +219,32 @@ def _plan_stages(
     if request.duration is not None:
         stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
+
+
+def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: str) -> Array | None:
+    """Return the joint positions (n,) that a MOVE goes to; None where it goes to a frame.
+
+    Raises:
+        RunError: they do not fit the arm.
+    """
+    asked, span = request.joints, request.goals[request.form.goal].span
+    model, targets = machine.cell.arms[arm].arm, machine.cell.joint_targets
+    if asked is None:
+        return None
+    if isinstance(asked, str):
+        if asked not in targets:
+            known = [f"joint targets of the cell: {', '.join(sorted(targets)) or 'none'}"]
+            text = f"the cell has no joint target `{machine.spelling(asked)}`"
+            raise machine.error(process, "E242", text, span, "no such joint target", notes=known)
+        if targets[asked].arm != arm:
+            text = f"joint target `{machine.spelling(asked)}` is one of {targets[asked].arm}, not of {arm}"
+            raise machine.error(process, "E242", text, span, "of another arm")
+        return targets[asked].q
+    if len(asked) != model.n:
+        text = f"{arm} has {counted(model.n, 'joint')}, but JOINTS is given {len(asked)}"
+        raise machine.error(process, "E242", text, span, f"expected {model.n} positions")
+    units = machine.code.units
+    return np.where(model.revolute, units.radians, units.metres) * np.array(asked)
 
 
 def _goal_pose(machine: Machine, process: Process, goal: Goal) -> Array:
@@ -234,7 +283,8 @@ def _fail_move(
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = request.goals[label], stage.kind.value
-    frame = machine.variable_name(process, goal.operand)
+    is_frame = request.joints is None or label != request.form.goal
+    frame = machine.variable_name(process, goal.operand) if is_frame else None
     secondary = machine.origin_labels(frame, f"`{label}` got its pose here") if frame else []
     raise machine.error(
         process,
@@ -244,7 +294,10 @@ def _fail_move(
         "cannot be reached",
         secondary=secondary,
         notes=(obstacle_location(obstacle, kind, stage.frames, arm),),
-        helps=(*_unit_advice(machine, process, goal, arm), *detour_advice(obstacle, kind, machine.cell.around)),
+        helps=(
+            *(_unit_advice(machine, process, goal, arm) if is_frame else ()),
+            *detour_advice(obstacle, kind, machine.cell.around),
+        ),
     )
 
 
@@ -342,7 +395,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.MVHLT: halt_motion,
     # The parts of a MOVE are gathered by its end.
     **dict.fromkeys(
-        (Op.MVBEG, Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
+        (Op.MVBEG, *sorted(MOVE_PARTS)),
         lambda *_: None,
     ),
 }

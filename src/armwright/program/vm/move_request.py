@@ -1,5 +1,6 @@
 """What the instructions of one MOVE ask for, gathered and checked."""
 
+from collections.abc import Sequence
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ class Goal(NamedTuple):
 
 
 class MoveRequest(NamedTuple):
-    """What the instructions of one MOVE ask for."""
+    """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is."""
 
     begin: Instruction
     form: Form
@@ -34,6 +35,7 @@ class MoveRequest(NamedTuple):
     duration: float | None
     guards: list[Guard]
     span: Span
+    joints: Sequence[float] | str | None = None
 
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
@@ -45,9 +47,16 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
     begin, parts = instructions[first], instructions[first + 1 : index]
     goals: dict[str, list[Goal]] = {"goal": [_goal(machine, process, begin.operands[1], begin)]}
     numbers: dict[Op, float] = {}
-    guards = []
+    guards, joints = [], None
     for part in parts:
-        if part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
+        if part.op is Op.MVJNT:
+            joints = [machine.read_number(process, operand, part.span) for operand in part.operands]
+        elif part.op is Op.MVTGT:
+            joints = str(part.operands[0])
+        if part.op in (Op.MVJNT, Op.MVTGT):
+            label = " ".join(machine.code.source.slice(part.span).split()) or "JOINTS"
+            goals["goal"] = [Goal(label, part.op, part.span)]
+        elif part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
             goals[part.op] = [_goal(machine, process, operand, part) for operand in part.operands]
         elif part.op in (Op.MVSPD, Op.MVBLD, Op.MVDUR):
             numbers[part.op] = _clause_value(machine, process, part)
@@ -72,6 +81,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         duration=duration,
         guards=guards,
         span=step.span,
+        joints=joints,
     )
 
 

@@ -69,7 +69,7 @@ def replanned(
             break
         old = done.stages[k].trajectory
         try:
-            path = plan(done.move, k, _goals(machine, move.arm, old, last=k == len(stages) - 1))
+            path = plan(done.move, k, _goals(machine, move.arm, old, last=_is_free(done.stages, k)))
         except (PlanningError, IncapableArmError) as error:
             return done._replace(failure=str(error))
         motion = path.trajectory
@@ -84,6 +84,12 @@ def replanned(
         moved = attrs.evolve(done.move, stages=tuple(stage.trajectory for stage in new))
         done = Replanned(moved, new, {**done.paths, k: path}, check(moved))
     return done
+
+
+def _is_free(stages: Sequence[PlannedStage], number: int) -> bool:
+    """Whether a stage may end in any configuration that takes its pose: it is the last, and JOINTS asks for none."""
+    goal = stages[number].goal
+    return number == len(stages) - 1 and (goal is None or goal.joints is None)
 
 
 def can_be_passed(collision: Collision, stage: PlannedStage) -> bool:
