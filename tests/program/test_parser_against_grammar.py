@@ -49,6 +49,7 @@ WORDS = {
         "log",
         "pulse",
         "within",
+        "circularly",
         "raise",
         "jam",
     ),

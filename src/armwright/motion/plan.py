@@ -12,6 +12,7 @@ from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
 from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.motion.arc import arc, coarse_arc
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
@@ -31,7 +32,7 @@ _FARTHEST = 1e6
 # Points of the tool along a smooth motion from which its length is summed.
 _LOOKS = 101
 
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC"]
 
 
 @attrs.frozen(kw_only=True)
@@ -57,7 +58,8 @@ class StageGoal:
     """What one stage has to do.
 
     Attributes:
-        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop.
+        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop, ``ARC``
+            through the position of the first of two to the second.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
         joints: (n,) joint positions that a ``PTP`` is to end at, whose pose ``poses`` has; None for any that take it.
         blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
@@ -162,6 +164,7 @@ def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Ma
         One planned stage per goal.
 
     Raises:
+        FlatArcError: the positions of an arc are on one line.
         StageError: a stage cannot be made from any configuration; it names the first obstacle of the nearest one, on a
             straight line also where a detour was searched for in vain.
         InvalidValueError: speed or deviation are out of range.
@@ -218,6 +221,9 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
         # Planned as they are asked for: nearly always the first one does.
         yield from (_direct(arm, q, end, manner) for end in _configurations(arm, poses[0], q, number))
         return
+    if goal.kind == "ARC":
+        yield _on_arc(arm, q, poses, manner, number)
+        return
     path = Path(poses=np.concatenate([np.asarray(solver_of(arm).forward(q))[None], poses]))
     try:
         yield _along(arm, path, q, goal, manner)
@@ -227,6 +233,45 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
         if bypass is None:
             raise StageError(number, obstacle) from error
         yield bypass
+
+
+def _on_arc(arm: AnyArm, q: Array, poses: Array, manner: Manner, number: int) -> PlannedStage:
+    """Return the stage that follows an arc."""
+    solver = solver_of(arm)
+    through, end = poses
+    try:
+        try:
+            motion = coarse_arc(arm, q, through, end, deviation=manner.deviation, speed=manner.speed)
+        except PathError:
+            check_ends(solver, Path(poses=np.stack([np.asarray(solver.forward(q)), end])), q)
+            raise
+    except PathError as error:
+        planned = arc(np.asarray(solver.forward(q)), through, end)
+        # That the goal itself cannot be taken is said of the way to it.
+        certain = error.fraction == 1 and not inverse(solver.arm, end).allowed
+        segment = 1 if certain else error.segment
+        part = planned.through if segment == 0 else 1 - planned.through
+        obstacle = Obstacle(
+            cause=error.cause,
+            reason=error.reason,
+            joint=error.joint,
+            pose=segment,
+            fraction=error.fraction,
+            length=planned.length * part,
+            place=planned.at(np.array(planned.part(segment, error.fraction)))[:3, 3],
+            certain=certain,
+        )
+        raise StageError(number, obstacle) from error
+    motion = motion.on_ticks(manner.period)
+    certificate = motion.certificate
+    return PlannedStage(
+        kind="ARC",
+        trajectory=motion.trajectory,
+        length=tool_path_length(arm, motion.trajectory),
+        certificate=certificate,
+        deviation=certificate.deviation,
+        slowed=certificate.slowed,
+    )
 
 
 def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> PlannedStage:

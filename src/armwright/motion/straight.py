@@ -23,7 +23,7 @@ from armwright.motion.tracking import Task, check_velocities, track
 from armwright.spatial.rotations import rotation_vector
 
 # Part of the time in which the tool gathers speed, and again in which it loses it, by the speed that is asked for.
-_RAMP = 0.25
+RAMP = 0.25
 # Of an allowed deviation of a line in a program no more is used than the first of these that it allows and with which
 # the line can be run [m].
 COARSE = (1e-3, 2e-3, 5e-3)
@@ -105,10 +105,10 @@ def certified_line(
     if even is None:
         return standstill(solver, q, allowed)
     motion = line(A, B, rotation, even, near=allowed.position)
-    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_requested_time, even))
+    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(requested_time, even))
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     check_velocities(task, tracked)
-    nominal = even / (1 - _RAMP)
+    nominal = even / (1 - RAMP)
     return fastest(solver, tracked, allowed, nominal=nominal, period=period, weak=weak)
 
 
@@ -141,7 +141,7 @@ def requested_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath |
     """Return the line from A to B at the speed of the report's rule, whatever the joints; None for one of no length."""
     rotation = rotation_vector(A[:3, :3].T @ B[:3, :3])
     even = even_time(arm, A, B, rotation, speed)
-    return None if even is None else line(A, B, rotation, even, near=0.0, ramp=_RAMP)
+    return None if even is None else line(A, B, rotation, even, near=0.0, ramp=RAMP)
 
 
 def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> float | None:
@@ -174,14 +174,14 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     return np.asarray(motion.duration * (np.arange(last + 1) / last))
 
 
-def _requested_time(even: float, t: Array) -> Array:
+def requested_time(even: float, t: Array) -> Array:
     """Return when times of a line at even speed are passed where the tool gathers speed first, and loses it, evenly.
 
     Args:
         even: the duration at even speed [s].
         t: (k,) [s].
     """
-    ramp = _RAMP * even / (1 - _RAMP)
+    ramp = RAMP * even / (1 - RAMP)
     near = np.minimum(t, even - t)
     after = np.where(near < ramp / 2, np.sqrt(2 * ramp * np.maximum(near, 0.0)), near + ramp / 2)
     return np.where(t < even / 2, after, even + ramp - after)

@@ -13,6 +13,7 @@ from armwright.program.syntax import tree
 # In the order of the listing: the way, the points on it, the speed.
 _CLAUSES: dict[type, Op] = {
     tree.Straightly: Op.MVSTR,
+    tree.Circularly: Op.MVCIR,
     tree.Departure: Op.MVDEP,
     tree.Via: Op.MVVIA,
     tree.Approach: Op.MVAPP,
@@ -91,6 +92,7 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
         departure=ends.get(tree.Departure),
         straight=tree.Straightly in clauses,
         blend=tree.Blend in clauses,
+        circular=tree.Circularly in clauses,
     )
 
 

@@ -72,13 +72,15 @@ _WORD_SNIPPETS = {
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
-_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *_VOCABULARY.with_clauses))
+_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_VOCABULARY.with_clauses))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
-    "DIRECTLY": frozenset(("STRAIGHTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
-    "STRAIGHTLY": frozenset(("DIRECTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
-    **dict.fromkeys(("VIA", "APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY"))),
+    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
+    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
+    **dict.fromkeys(("APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
     "SPEED": frozenset(("DURATION",)),
     "DURATION": frozenset(("SPEED",)),
 }

@@ -18,7 +18,7 @@ class WordDoc(NamedTuple):
     text: str
 
 
-_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY] [VIA (poses)] [WITH ... = ...] [ON condition DO action]"
+_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY | CIRCULARLY] [VIA (poses)] [WITH ... = ...] [ON ... DO ...]"
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
 _COBEGIN = "COBEGIN [PRIORITY number :] BEGIN ... END ; BEGIN ... END COEND"
@@ -89,6 +89,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "MOVE": (_MOVE, "Moves an arm, or a frame that is affixed to an arm, to the pose of the goal."),
     "DIRECTLY": (_MOVE, "Moves all joints at once, without a straight path of the tool; this is the default."),
     "STRAIGHTLY": (_MOVE, "Moves the tool in a straight line."),
+    "CIRCULARLY": (
+        "MOVE frame TO goal CIRCULARLY, VIA (pose)",
+        "Moves the tool on an arc of a circle through the position of another pose.",
+    ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
         "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION = value",

@@ -132,6 +132,6 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
-    fixed = (NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.TARGET)
-    fixed += (NameKind.VALUE, NameKind.ERROR)
+    fixed = {NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.TARGET}
+    fixed |= {NameKind.VALUE, NameKind.ERROR}
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

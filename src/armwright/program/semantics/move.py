@@ -13,6 +13,7 @@ from armwright.program.syntax import tree
 # What a clause gives, and what stands against it where DIRECTLY is given.
 _CONFLICTS_WITH_DIRECTLY: dict[type, tuple[str, str]] = {
     tree.Straightly: ("a straight line asked for here", "requests one motion of the joints to the goal"),
+    tree.Circularly: ("an arc asked for here", "requests one motion of the joints to the goal"),
     tree.Via: ("via points given here", "allows no via points"),
     tree.Approach: ("approach point given here", "allows no approach point"),
     tree.Departure: ("departure point given here", "allows no departure point"),
@@ -66,7 +67,7 @@ def _check_pose(
 
 
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.
-_CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Via, tree.Approach)
+_CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Approach)
 
 
 def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> None:
@@ -108,9 +109,29 @@ def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) ->
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
             text = f"{tree.clause_word(type(clause))} is given twice in one MOVE"
             names.report("E213", text, clause.span, "second", secondary=labels(earlier.span, "first"))
+    if (circular := first.get(tree.Circularly)) is not None:
+        _check_arc(names, circular, first)
     if len(first) > 1 or tree.Blend in first:
         _check_paths(names, first)
         _check_durations(names, first)
+
+
+def _check_arc(names: NameResolver, circular: tree.Clause, first: dict[type, tree.Clause]) -> None:
+    """Check that an arc has one frame to pass, and no other way to go."""
+    via = first.get(tree.Via)
+    if not isinstance(via, tree.Via):
+        advice = "write `CIRCULARLY, VIA (f)` with a frame on the arc"
+        names.report("E243", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
+    elif len(via.points) > 1:
+        text, here = f"an arc passes one frame, not {len(via.points)}", labels(circular.span, "an arc asked for here")
+        advice = "write one `MOVE ... CIRCULARLY` for each arc"
+        names.report("E243", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
+    for kind in (tree.Straightly, tree.Approach, tree.Departure, tree.Blend):
+        if clause := first.get(kind):
+            text = f"CIRCULARLY cannot be combined with {tree.clause_word(kind)}"
+            here = labels(circular.span, "requests one arc")
+            advice = "write a MOVE for the arc, and one for each other leg"
+            names.report("E243", text, clause.span, "another way", secondary=here, advice=advice)
 
 
 def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
@@ -121,7 +142,7 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
         if direct and label:
             here, advice = labels(direct.span, against), "remove one of the two"
             names.report("E208", f"DIRECTLY {combined}", clause.span, label, secondary=here, advice=advice)
-        elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
+        elif straight and tree.Circularly not in first and kind in (tree.Via, tree.Approach, tree.Departure):
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
             names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)

@@ -128,6 +128,11 @@ class Straightly(Node):
 
 
 @attrs.frozen
+class Circularly(Node):
+    """One arc of a circle, through the one frame of VIA."""
+
+
+@attrs.frozen
 class Via(Node):
     """``VIA (points)``."""
 
@@ -178,7 +183,7 @@ class On(Node):
     action: "Statement"
 
 
-Clause: TypeAlias = Directly | Straightly | Via | Approach | Departure | Speed | Blend | Duration | On
+Clause: TypeAlias = Directly | Straightly | Circularly | Via | Approach | Departure | Speed | Blend | Duration | On
 
 
 def clause_word(kind: type) -> str:

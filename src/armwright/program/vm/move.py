@@ -11,6 +11,7 @@ from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.errors import IncapableArmError, counted
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.arc import FlatArcError
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import (
@@ -213,6 +214,10 @@ def _plan_stages(
         stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
+    except FlatArcError as error:
+        text = f"no arc leads through `{request.form.via[0]}` to `{request.form.goal}`: they are on one line"
+        helps = ["choose a frame to pass that is farther off the line, or write STRAIGHTLY instead"]
+        raise machine.error(process, "E407", text, request.span, "no arc", notes=[str(error)], helps=helps) from None
     except IncapableArmError as error:
         text = f"{arm} cannot make this MOVE at any speed: {error}"
         raise machine.error(process, "E406", text, request.span, "asked for here") from None
@@ -244,7 +249,7 @@ def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: 
         text = f"{arm} has {counted(model.n, 'joint')}, but JOINTS is given {len(asked)}"
         raise machine.error(process, "E242", text, span, f"expected {model.n} positions")
     units = machine.code.units
-    return np.where(model.revolute, units.radians, units.metres) * np.array(asked)
+    return np.asarray(np.where(model.revolute, units.radians, units.metres) * np.array(asked))
 
 
 def _goal_pose(machine: Machine, process: Process, goal: Goal) -> Array:

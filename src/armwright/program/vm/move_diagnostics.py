@@ -32,7 +32,7 @@ _PATH_MESSAGES = {
 }
 # Farther away nobody counts tenths [mm].
 _LARGE_COORDINATE = 1e6
-_THROUGH_FRAMES = ("SPLINE", "BLEND")
+_THROUGH_FRAMES = ("SPLINE", "BLEND", "ARC")
 _METHODS = {"via": "by a via pose", "damped": "by damped least squares"}
 
 
@@ -48,7 +48,7 @@ def obstacle_location(obstacle: Obstacle, kind: str, goal_names: Sequence[str], 
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE``, ``BLEND`` or ``ARC``.
         goal_names: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
@@ -67,7 +67,7 @@ def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[st
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE``, ``BLEND`` or ``ARC``.
         around: method by which a detour was searched for; None where none was.
     """
     if obstacle.certain or kind == "PTP":

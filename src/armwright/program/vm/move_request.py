@@ -47,7 +47,8 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
     begin, parts = instructions[first], instructions[first + 1 : index]
     goals: dict[str, list[Goal]] = {"goal": [_goal(machine, process, begin.operands[1], begin)]}
     numbers: dict[Op, float] = {}
-    guards, joints = [], None
+    guards: list[Guard] = []
+    joints: Sequence[float] | str | None = None
     for part in parts:
         if part.op is Op.MVJNT:
             joints = [machine.read_number(process, operand, part.span) for operand in part.operands]
@@ -70,6 +71,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         departure=goals[Op.MVDEP][0].label if Op.MVDEP in goals else None,
         straight=any(part.op is Op.MVSTR for part in parts),
         blend=Op.MVBLD in numbers,
+        circular=any(part.op is Op.MVCIR for part in parts),
     )
     duration = numbers.get(Op.MVDUR)
     return MoveRequest(
