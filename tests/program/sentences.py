@@ -18,6 +18,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "PULSE": ("PULSE", "pulse"),
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
+    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration"),
     "CIRCULARLY": ("CIRCULARLY", "circularly"),
     "WITHIN": ("WITHIN", "within"),
     "LOG": ("LOG", "log"),

@@ -94,6 +94,7 @@ def test_run_time_pages_run() -> None:
         "W402",
         "W403",
         "W404",
+        "W405",
     ):
         assert "// run in " in find_page(code).wrong, code
 

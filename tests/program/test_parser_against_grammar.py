@@ -50,6 +50,7 @@ WORDS = {
         "pulse",
         "within",
         "circularly",
+        "velocity",
         "raise",
         "jam",
     ),

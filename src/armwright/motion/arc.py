@@ -24,8 +24,9 @@ from armwright.motion.deviation import (
 from armwright.motion.obstruction import PathError
 from armwright.motion.path import TURN_RADIUS, check_reach, report_speed
 from armwright.motion.solver import AnyArm, Solver, solver_of
-from armwright.motion.straight import RAMP, coarse_deviations, requested_time
+from armwright.motion.straight import RAMP, limited_time, requested_time, tried_deviations
 from armwright.motion.tolerance import Tolerance, tolerance
+from armwright.motion.tool_limits import ToolLimits
 from armwright.motion.tracking import Task, check_velocities, track
 from armwright.spatial.poses import homogeneous, position_text
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
@@ -153,7 +154,14 @@ def arc(start: Array, through: Array, end: Array, duration: float = 1.0) -> Arc:
 
 
 def certified_arc(
-    arm: AnyArm, q_start: Array, through: Array, end: Array, allowed: Tolerance, *, speed: float
+    arm: AnyArm,
+    q_start: Array,
+    through: Array,
+    end: Array,
+    allowed: Tolerance,
+    *,
+    speed: float,
+    tool: ToolLimits | None = None,
 ) -> CertifiedMotion:
     """Plan an arc of the tool and certify it, as ``straight_line`` plans a line.
 
@@ -164,6 +172,7 @@ def certified_arc(
         end: (4, 4) pose at the end.
         allowed: how far the tool may be from the arc.
         speed: 1 to 120, 100 is normal: by the report's rule, as for a line; the slowest of the legs of the arc counts.
+        tool: as for ``certified_line``.
 
     Returns:
         The motion, at rest at both ends, and its certificate.
@@ -178,7 +187,11 @@ def certified_arc(
     check_reach(solver.arm)
     corners = planned.at(np.linspace(0.0, 1.0, _LEGS + 1))[:, :3, 3]
     slowest = min(report_speed(solver.arm, A, B, speed) for A, B in pairwise(corners))
-    even = max(planned.length, TURN_RADIUS * math.hypot(*planned.rotation)) / slowest
+    angle = math.hypot(*planned.rotation)
+    even, ramp = max(planned.length, TURN_RADIUS * angle) / slowest, 0.0
+    if tool is not None:
+        even = limited_time(solver.arm, planned.length, angle, slowest, tool)
+        ramp = planned.length / even / tool.acceleration
     planned = attrs.evolve(planned, duration=even)
     task = Task(solver, planned, q_start, allowed, allowed, rest=False, clock=partial(requested_time, even))
     count = max(_MIN_KNOTS, _KNOTS_PER_TURN * planned.angle / (2 * math.pi))
@@ -188,11 +201,18 @@ def certified_arc(
     knots = even * np.concatenate([there, on[1:]])
     tracked = track(task, knots)
     check_velocities(task, tracked)
-    return fastest(solver, tracked, allowed, nominal=even / (1 - RAMP), weak=True)
+    return fastest(solver, tracked, allowed, nominal=max(even / (1 - RAMP), even + ramp), weak=True, ramp=ramp)
 
 
 def coarse_arc(
-    arm: AnyArm, q_start: Array, through: Array, end: Array, *, deviation: float, speed: float
+    arm: AnyArm,
+    q_start: Array,
+    through: Array,
+    end: Array,
+    *,
+    deviation: float,
+    speed: float,
+    tool: ToolLimits | None = None,
 ) -> CertifiedMotion:
     """Return the arc of a program: kept closer than asked where that is no obstruction, as ``coarse_line`` does.
 
@@ -201,9 +221,9 @@ def coarse_arc(
         FlatArcError: the positions are on one line.
     """
     errors: list[PathError] = []
-    for tried in coarse_deviations(deviation):
+    for tried in tried_deviations(deviation, tool):
         try:
-            return certified_arc(arm, q_start, through, end, tolerance(tried), speed=speed)
+            return certified_arc(arm, q_start, through, end, tolerance(tried), speed=speed, tool=tool)
         except PathError as error:
             errors.append(error)
             if error.cause == "reach":  # a pose out of reach is so for every deviation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 
@@ -17,6 +18,7 @@ from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
+from armwright.motion.limited import limited_motion
 from armwright.motion.obstruction import Cause, PathError, cause_of, check_ends
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
@@ -24,6 +26,7 @@ from armwright.motion.rounded_corners import rounded_move
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_line
 from armwright.motion.through import through
+from armwright.motion.tool_limits import ToolLimits, tool_peaks
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
@@ -31,6 +34,9 @@ _FARTHEST = 1e6
 
 # Points of the tool along a smooth motion from which its length is summed.
 _LOOKS = 101
+
+# A joint that moves at this part of its speed limit moves at it; a speed of which this part is reached is reached.
+_AT_LIMIT, _REACHED = 0.98, 0.98
 
 StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC"]
 
@@ -45,12 +51,15 @@ class Manner:
         period: of the servo [s]; stages last a whole number of it.
         around: how to go round what stops a straight line, see ``line_or_detour``; None to stop there. Only a LINE is
             bypassed: a path through several frames is run without a stop, unlike a detour of one of its parts.
+        tool: limits of the tool that are kept besides those of the joints; None for none. A speed of them is used
+            instead of that of the report's rule.
     """
 
     speed: float = 100.0
     deviation: float = 1e-3
     period: float = 1e-3
     around: DetourMethod | None = None
+    tool: ToolLimits | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -119,6 +128,8 @@ class PlannedStage:
             stops at every frame; None where there is nothing of the kind.
         detour: the detour, and its price; None where there is no obstacle, and of a SPLINE.
         goal: what it was planned for.
+        unmet: the speeds of the tool that were asked for and that the limits of the arm do not allow; the first are
+            those asked for, the second those that it reaches. None where the arm could do as asked.
     """
 
     kind: StageKind
@@ -130,6 +141,7 @@ class PlannedStage:
     obstacle: Obstacle | None = None
     detour: Detour | None = None
     goal: StageGoal | None = None
+    unmet: tuple[ToolLimits, ToolLimits] | None = None
 
 
 class StageError(ArmwrightError, ValueError):
@@ -195,13 +207,35 @@ def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, num
     if number == len(goals):
         return []
     errors: list[StageError] = []
-    for stage in _candidates(arm, q, goals[number], manner, number):
+    for candidate in _candidates(arm, q, goals[number], manner, number):
+        stage = candidate if manner.tool is None else _with_tool_limits(arm, candidate, manner, manner.tool)
         try:
             following = _plan(arm, stage.trajectory(stage.trajectory.duration), goals, manner, number + 1)
             return [attrs.evolve(stage, goal=goals[number]), *following]
         except StageError as error:
             errors.append(error)
     raise errors[0]
+
+
+def _with_tool_limits(arm: AnyArm, stage: PlannedStage, manner: Manner, tool: ToolLimits) -> PlannedStage:
+    """Return a stage slowed so that the tool keeps its limits, with the speeds that the arm cannot reach."""
+    model, trajectory = solver_of(arm).arm, stage.trajectory
+    if not trajectory.duration:
+        return stage
+    factor = tool.slowing(model, trajectory)
+    if factor > 1:
+        slow, certificate = whole_ticks(trajectory.slowed(factor), manner.period), stage.certificate
+        stretch = slow.duration / trajectory.duration
+        certificate = None if certificate is None else certificate.retimed(stretch)
+        stage = attrs.evolve(stage, trajectory=slow, certificate=certificate)
+    reached = tool_peaks(model, stage.trajectory)
+    speeds = limited_motion(model, stage.trajectory).peaks(1) / model.all_limits.speed
+    too_fast = stage.kind != "PTP" and math.isfinite(tool.speed) and tool.speed > model.tool_speed
+    at_limit = too_fast or bool(speeds.max() > _AT_LIMIT)
+    # Where both are given, the one keeps the other from being reached.
+    is_met = reached.speed > _REACHED * tool.speed or reached.rotation > _REACHED * tool.rotation
+    asked = math.isfinite(tool.speed) or math.isfinite(tool.rotation)
+    return attrs.evolve(stage, unmet=(tool, reached)) if asked and at_limit and not is_met else stage
 
 
 def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[PlannedStage]:
@@ -241,7 +275,7 @@ def _on_arc(arm: AnyArm, q: Array, poses: Array, manner: Manner, number: int) ->
     through, end = poses
     try:
         try:
-            motion = coarse_arc(arm, q, through, end, deviation=manner.deviation, speed=manner.speed)
+            motion = coarse_arc(arm, q, through, end, deviation=manner.deviation, speed=manner.speed, tool=manner.tool)
         except PathError:
             check_ends(solver, Path(poses=np.stack([np.asarray(solver.forward(q)), end])), q)
             raise
@@ -280,12 +314,12 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
     stops, stopped_by = "", None
     if goal.kind == "LINE":
         try:
-            motion = coarse_line(arm, q, path.poses[1], **how)
+            motion = coarse_line(arm, q, path.poses[1], **how, tool=manner.tool)
         except PathError:
             check_ends(solver_of(arm), path, q)  # a goal that cannot be taken at all is said to be so
             raise
     elif goal.kind == "BLEND" or goal.corner is not None:
-        run = rounded_move(arm, path, q, corner=goal.corner, blend=goal.blend, **how)
+        run = rounded_move(arm, path, q, corner=goal.corner, blend=goal.blend, **how, tool=manner.tool)
         motion, stops, stopped_by = run.motion, run.stops, run.stopped_by
     else:
         motion = through(arm, path, q, **how)

@@ -118,6 +118,9 @@ class Op(enum.StrEnum):
     MVSPD = "MVSPD", "N"  # number: speed
     MVBLD = "MVBLD", "N"  # number: how far from via points corners may be rounded
     MVDUR = "MVDUR", "N"  # number: how long it shall take
+    MVVEL = "MVVEL", "N"  # number: largest speed of the tool point
+    MVROT = "MVROT", "N"  # number: largest angular speed of the tool
+    MVACC = "MVACC", "N"  # number: largest change of the speed of the tool point
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
@@ -156,7 +159,7 @@ class Op(enum.StrEnum):
 MOVE_PARTS = frozenset(
     (
         *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
-        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
+        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVON),
     )
 )
 

@@ -20,6 +20,9 @@ _CLAUSES: dict[type, Op] = {
     tree.Speed: Op.MVSPD,
     tree.Blend: Op.MVBLD,
     tree.Duration: Op.MVDUR,
+    tree.Velocity: Op.MVVEL,
+    tree.Rotation: Op.MVROT,
+    tree.Acceleration: Op.MVACC,
 }
 
 

@@ -56,7 +56,7 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _check_speed(state, clause.value)
-        elif isinstance(clause, tree.Blend | tree.Duration):
+        elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
             require_value(state, clause.value)
     if arm is None:
         return None

@@ -69,6 +69,7 @@ HEADERS_IN_CONTEXT = ("CONST", "FUNCTION")
 PARAMETER_MODES = ("IN", "INOUT")
 # Clauses of MOVE that are words only where a clause may begin.
 PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
+WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION")
 # What starts a statement only in front of a name.
 STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE")
 # What starts a statement only in front of a text.
@@ -79,6 +80,7 @@ WORDS_IN_CONTEXT = frozenset(
         *HEADERS_IN_CONTEXT,
         *PARAMETER_MODES,
         *PLAIN_CLAUSES_IN_CONTEXT,
+        *WITH_CLAUSES_IN_CONTEXT,
         *STATEMENTS_BEFORE_NAME,
         *STATEMENTS_BEFORE_TEXT,
         "RETURN",

@@ -20,6 +20,7 @@ from armwright.program.language.words import (
     STATEMENTS_BEFORE_TEXT,
     VALUES,
     VOCABULARIES,
+    WITH_CLAUSES_IN_CONTEXT,
     WORDS_IN_CONTEXT,
     Standard,
 )
@@ -57,10 +58,11 @@ _SNIPPETS = {
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
     "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
+_WITH_CLAUSES = (*VOCABULARIES[Standard.RLO_2].with_clauses, *WITH_CLAUSES_IN_CONTEXT)
 # How a word that wants more is written on.
 _WORD_SNIPPETS = {
     "VIA": "VIA (${1:point})",
-    **{word: f"{word} = ${{1:value}}" for word in ("APPROACH", "DEPARTURE", "SPEED", "BLEND", "DURATION")},
+    **{word: f"{word} = ${{1:value}}" for word in (*_WITH_CLAUSES,)},
     "ON": "ON ${1:condition} DO ${2:HALT}",
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
@@ -72,7 +74,7 @@ _WORD_SNIPPETS = {
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
-_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_VOCABULARY.with_clauses))
+_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAUSES))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
@@ -81,8 +83,9 @@ _EXCLUDES: Mapping[str, frozenset[str]] = {
     "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
     "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
     **dict.fromkeys(("APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
-    "SPEED": frozenset(("DURATION",)),
-    "DURATION": frozenset(("SPEED",)),
+    "SPEED": frozenset(("DURATION", "VELOCITY")),
+    "DURATION": frozenset(("SPEED", "VELOCITY")),
+    "VELOCITY": frozenset(("SPEED", "DURATION")),
 }
 
 
@@ -215,7 +218,7 @@ def _operand_rule(expected: ExpectedTokens, tokens: Sequence[Token], scope: Scop
     call = enclosing_call(tokens)
     if call is not None and operand not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
         rule = _argument_rule(*call, scope.symbols)
-    elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
+    elif where in (f"after {word} =" for word in _WITH_CLAUSES if word not in ("APPROACH", "DEPARTURE")):
         rule = _NUMBER
     elif rule is None:
         # Behind a comma stands a number of a matrix.

@@ -95,8 +95,8 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION = value",
-        "Specifies approach, departure, speed, rounding of corners or duration.",
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION = value",
+        "Specifies approach, departure, speed, rounding of corners, duration, or limits of the tool.",
     ),
     "APPROACH": ("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
     "DEPARTURE": ("WITH DEPARTURE = pose", "Leaves the start in a straight line to this pose."),
@@ -106,6 +106,15 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "BLEND": ("WITH BLEND = distance", "Moves straight between via points and rounds corners within this distance."),
     "DURATION": ("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
+    "VELOCITY": (
+        "WITH VELOCITY = length",
+        "The tool point moves at this length per second at most, and at that speed where the arm can; not with SPEED.",
+    ),
+    "ROTATION": ("WITH ROTATION = angle", "The tool turns by this angle per second at most."),
+    "ACCELERATION": (
+        "WITH ACCELERATION = length",
+        "In each second the speed of the tool point changes by this length per second at most.",
+    ),
     # control
     "IF": (_IF, "Chooses between two statements."),
     "THEN": (_IF, "Precedes the statement that runs when the condition holds."),

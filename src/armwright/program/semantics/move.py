@@ -42,10 +42,9 @@ def move(context: Context, node: tree.Move) -> None:
             case tree.Speed(value=value):
                 _check_speed(names, value)
             case tree.Blend(value=value) | tree.Duration(value=value):
-                required: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
-                word = tree.clause_word(type(clause))
-                if require_quantity(names, value, required, f"{word} needs a {required}"):
-                    check_range(names, value, f"a {word}", zero=False)
+                _check_quantity(names, clause, value)
+            case tree.Velocity(value=value) | tree.Rotation(value=value) | tree.Acceleration(value=value):
+                _check_quantity(names, clause, value)
             case tree.On(condition=wanted, action=action):
                 require_condition(names, wanted, "ON")
                 context.check_with(action, recovering=False)
@@ -97,6 +96,23 @@ def _check_speed(names: NameResolver, node: tree.Expression) -> None:
     if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
         text = f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
         names.report("E207", text, node.span, "out of range", note=SPEED_NOTE)
+
+
+# Clauses that are quantities: what each measures, with the unit of the program, and what it needs in words.
+_QUANTITIES: dict[type, tuple[Dimension, str]] = {
+    tree.Blend: ("length", "a length"),
+    tree.Duration: ("time", "a time"),
+    tree.Velocity: ("length", "a length per second"),
+    tree.Rotation: ("angle", "an angle per second"),
+    tree.Acceleration: ("length", "a length per second squared"),
+}
+
+
+def _check_quantity(names: NameResolver, clause: tree.Clause, value: tree.Expression) -> None:
+    """Check a clause that is a quantity: a number above 0, whose unit fits where it has one."""
+    (required, needs), word = _QUANTITIES[type(clause)], tree.clause_word(type(clause))
+    if require_quantity(names, value, required, f"{word} needs {needs}"):
+        check_range(names, value, f"{'an' if word == 'ACCELERATION' else 'a'} {word}", zero=False)
 
 
 def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) -> None:
@@ -152,11 +168,14 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
 
 
 def _check_durations(names: NameResolver, first: dict[type, tree.Clause]) -> None:
-    speed, duration = first.get(tree.Speed), first.get(tree.Duration)
-    if speed and duration:
-        earlier, later = sorted((speed, duration), key=lambda clause: clause.span.start)
+    for kinds in ((tree.Speed, tree.Duration), (tree.Speed, tree.Velocity), (tree.Velocity, tree.Duration)):
+        given = [clause for clause in map(first.get, kinds) if clause is not None]
+        if len(given) < len(kinds):
+            continue
+        earlier, later = sorted(given, key=lambda clause: clause.span.start)
         first_word, word = tree.clause_word(type(earlier)), tree.clause_word(type(later))
-        text, here = "SPEED cannot be combined with DURATION", labels(earlier.span, f"{first_word} given here")
+        text = f"{tree.clause_word(kinds[0])} cannot be combined with {tree.clause_word(kinds[1])}"
+        here = labels(earlier.span, f"{first_word} given here")
         note, advice = "each of them determines the duration of the motion", "remove one of the two"
         names.report("E230", text, later.span, f"{word} given here", secondary=here, note=note, advice=advice)
 

@@ -68,6 +68,8 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
     speed_text = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
+    if request.tool is not None and math.isfinite(request.tool.speed):
+        speed_text = f"@{request.tool.speed * 1e3:g} mm/s"
     process.motion = Motion(
         arm=arm,
         moved=moved,
@@ -209,7 +211,9 @@ def _plan_stages(
         )
         for legs in plans
     ]
-    manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
+    manner = Manner(
+        speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
+    )
     try:
         stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
@@ -280,7 +284,9 @@ def _retime_stage(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> Pla
     if certificate is not None and slow.duration:
         certificate = certificate.retimed(slow.duration / stage.trajectory.duration)
         certificate = attrs.evolve(certificate, factor=1.0, because=None) if longer else certificate
-    return attrs.evolve(stage, trajectory=slow, slowed="" if longer else stage.slowed, certificate=certificate)
+    unmet = None if longer else stage.unmet
+    slowed = "" if longer else stage.slowed
+    return attrs.evolve(stage, trajectory=slow, slowed=slowed, certificate=certificate, unmet=unmet)
 
 
 def _fail_move(
