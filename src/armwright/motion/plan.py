@@ -71,7 +71,7 @@ class StageGoal:
             through the position of the first of two to the second.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
         joints: (n,) joint positions that a ``PTP`` is to end at, whose pose ``poses`` has; None for any that take it.
-        blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
+        blend: how far from a corner the rounding may begin [m], one number or one for each; only for ``BLEND``.
         corner: how far a ``SPLINE`` may be off the straight legs, and pass a pose [m]; None for the report's own
             X-spline through the poses.
     """
@@ -79,7 +79,7 @@ class StageGoal:
     kind: StageKind
     poses: Array
     joints: Array | None = None
-    blend: float | None = None
+    blend: float | Array | None = None
     corner: float | None = None
 
 

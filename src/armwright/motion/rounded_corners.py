@@ -140,7 +140,7 @@ def rounded_move(
     deviation: float,
     speed: float,
     corner: float | None = None,
-    blend: float | None = None,
+    blend: float | Array | None = None,
     tool: ToolLimits | None = None,
 ) -> RoundedMotion:
     """Plan a run straight from pose to pose that rounds its corners and rests only at both ends.
@@ -158,7 +158,8 @@ def rounded_move(
         corner: how far the tool may be from the straight legs, and pass a pose, at most [m]; the orientation may be
             off by ``ROTATION_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
             that, and within 0.5 mm. Such a run is never slower than the legs one by one.
-        blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle.
+        blend: instead of it, how far from a pose its rounding may begin [m], one number or one for each pose between
+            the ends; where a leg is short, at its middle.
         tool: as for ``certified_line``.
 
     Returns:
@@ -170,8 +171,8 @@ def rounded_move(
         InvalidValueError: a number is out of range.
     """
     for what, value in (("blend", blend), ("corner", corner), ("deviation", deviation)):
-        if value is not None and not 0 < value < np.inf:
-            raise InvalidValueError(f"{what}: expected more than 0 m, got {value:g}")
+        if value is not None and not ((np.asarray(value) > 0) & (np.asarray(value) < np.inf)).all():
+            raise InvalidValueError(f"{what}: expected more than 0 m, got {np.min(value):g}")
     solver = solver_of(arm)
     together = NEGLIGIBLE if corner is None else max(min(_TOGETHER * corner, _MIDDLE / 2), NEGLIGIBLE)
     corners = _apart(path.poses, together)
@@ -184,7 +185,8 @@ def rounded_move(
     closer = max(min(deviation, allowed), min(_CLOSER * _NEAREST, allowed)) / _CLOSER
     line_deviation = closer + (together if len(corners) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
     half = np.minimum(legs.lengths[:-1], legs.lengths[1:]) / 2
-    widths = np.minimum(half, np.inf if blend is None else blend)
+    of_each = np.broadcast_to(np.inf if blend is None else blend, len(path.poses) - 2)
+    widths = np.minimum(half, of_each[np.array(corners[1:-1], dtype=np.intp) - 1])
     if corner is not None:
         widths = _blend_widths(legs, half, corner, line_deviation)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))

@@ -79,10 +79,11 @@ _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements)
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
-    "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
     "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
     "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
-    **dict.fromkeys(("APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
+    **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
+    "BLEND": frozenset(("DIRECTLY", "CIRCULARLY")),
     "SPEED": frozenset(("DURATION", "VELOCITY")),
     "DURATION": frozenset(("SPEED", "VELOCITY")),
     "VELOCITY": frozenset(("SPEED", "DURATION")),
@@ -257,7 +258,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
         # The action of ON has ended before the position, or starts after it.
         if last in _CLAUSES and (last in written or _EXCLUDES.get(last, frozenset()) & written):
             continue
-        if last == "BLEND" and "VIA" not in written:
+        if last == "BLEND" and not {"VIA", "STRAIGHTLY"} & written:
             continue
         if last in allowed and (word != "RETRY" or expected.is_in_recovery):
             yield word

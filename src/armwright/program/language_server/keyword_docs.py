@@ -104,7 +104,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "WITH SPEED = number",
         f"From {LOWEST_SPEED:g} to {HIGHEST_SPEED:g}, the maximum of the arm; {NORMAL_SPEED:g} is the normal speed.",
     ),
-    "BLEND": ("WITH BLEND = distance", "Moves straight between via points and rounds corners within this distance."),
+    "BLEND": (
+        "WITH BLEND = distance",
+        "Rounds the corners at via points within this distance, or that from a MOVE STRAIGHTLY to the next one.",
+    ),
     "DURATION": ("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
     "VELOCITY": (
         "WITH VELOCITY = length",

@@ -1,6 +1,7 @@
 """MOVE: the types of what it moves, its goal and its clauses, and which clauses go together."""
 
 from armwright.program.language.diagnostic import labels
+from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
 from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.context import Checks, Context
@@ -45,7 +46,8 @@ def move(context: Context, node: tree.Move) -> None:
                 _check_quantity(names, clause, value)
             case tree.Velocity(value=value) | tree.Rotation(value=value) | tree.Acceleration(value=value):
                 _check_quantity(names, clause, value)
-            case tree.On(condition=wanted, action=action):
+            case tree.On(condition=wanted, action=action, head=head):
+                _check_guard_place(names, node, head)
                 require_condition(names, wanted, "ON")
                 context.check_with(action, recovering=False)
 
@@ -67,6 +69,18 @@ def _check_pose(
 
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.
 _CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Approach)
+
+
+def _check_guard_place(names: NameResolver, node: tree.Move, head: Span) -> None:
+    """Report a guard of a MOVE that goes over into the next one."""
+    kinds = {type(clause): clause for clause in node.clauses}
+    if tree.Blend in kinds and tree.Straightly in kinds and tree.Via not in kinds:
+        text, here = (
+            "a MOVE that goes over into the next one has no guard",
+            labels(kinds[tree.Blend].span, "BLEND here"),
+        )
+        advice = "leave BLEND out, so that the MOVE ends at its goal"
+        names.report("E226", text, head, "until when?", secondary=here, advice=advice)
 
 
 def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> None:
@@ -162,9 +176,23 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
             names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)
-    if blend and not direct and tree.Via not in first:
+    if blend and not direct and tree.Via not in first and tree.Circularly not in first:
+        _check_going_over(names, blend, straight, first)
+
+
+def _check_going_over(
+    names: NameResolver, blend: tree.Clause, straight: tree.Clause | None, first: dict[type, tree.Clause]
+) -> None:
+    """Check a BLEND without VIA: a MOVE goes over into the next one only on a straight line."""
+    if straight is None:
         text = "BLEND rounds the corners at via points, but there is no VIA"
-        names.report("E226", text, blend.span, "no corners to round", advice="add `VIA ( ... )`, or leave BLEND out")
+        advice = "add `VIA ( ... )`, or STRAIGHTLY to go over into the next MOVE, or leave BLEND out"
+        names.report("E226", text, blend.span, "no corners to round", advice=advice)
+    elif (duration := first.get(tree.Duration)) is not None:
+        text = "a MOVE that goes over into the next one has no DURATION of its own"
+        here = labels(blend.span, "it goes over into the next one")
+        advice = "write SPEED or VELOCITY"
+        names.report("E226", text, duration.span, "of which part?", secondary=here, advice=advice)
 
 
 def _check_durations(names: NameResolver, first: dict[type, tree.Clause]) -> None:

@@ -157,6 +157,10 @@ def shut_down(machine: Machine, span: Span) -> list[str]:
 
 def _stop_motion(machine: Machine, process: Process, span: Span) -> int:
     """Give up the motion of a process, if it makes one; return when its arm is at rest [ticks]."""
+    if process.ahead is not None:
+        # They have not begun, though the program has taken the arm for being at their goal.
+        arm, process.ahead = process.ahead.arm, None
+        machine.update_hand_pose(arm, span)
     if process.motion is None:
         return _rest_tick(machine, process.last_arm)
     motion, end = process.motion, stop_arm(machine, process, span)

@@ -22,8 +22,9 @@ from armwright.program.vm.collisions import threatened_error
 from armwright.program.vm.contact import stop_too_deep
 from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
 from armwright.program.vm.machine import Handler, Limits, Machine, RunError
-from armwright.program.vm.move import advance_motion
+from armwright.program.vm.move import advance_motion, begin_moves_ahead
 from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_warning, speed_warning
+from armwright.program.vm.moves_ahead import is_done_at_once
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
@@ -189,6 +190,9 @@ def _advance(machine: Machine, process: Process) -> None:
         advance_motion(machine, process)
         return
     step = machine.code.instructions[process.pc]
+    if process.ahead is not None and not is_done_at_once(process, step):
+        begin_moves_ahead(machine, process, process.ahead)
+        return
     machine.count_step(process, step.span)
     process.pc += 1
     HANDLERS[step.op](machine, process, step)

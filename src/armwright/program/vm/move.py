@@ -40,7 +40,8 @@ from armwright.program.vm.contact import (
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
-from armwright.program.vm.process import EarlyEnd, Guard, Motion, Process
+from armwright.program.vm.moves_ahead import fits, goes_over, merged
+from armwright.program.vm.process import EarlyEnd, Guard, Motion, MovesAhead, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
 from armwright.spatial.poses import inverse
@@ -62,6 +63,48 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim_arm(process, arm, step.span, moved)
     _require_idle_arm(machine, process, arm, step.span)
+    if process.ahead is not None or goes_over(request):
+        ahead = process.ahead or MovesAhead(arm=arm, moved=moved, implied_affix=implied)
+        _put_ahead(machine, process, ahead, request, moved)
+        return
+    _begin_move(machine, process, request, arm, moved, implied=implied)
+
+
+def _put_ahead(machine: Machine, process: Process, ahead: MovesAhead, request: MoveRequest, moved: str) -> None:
+    """Let a MOVE wait for the next one, which it goes over into; begin them all where this is the last of them."""
+    if ahead.requests and not fits(ahead, request, moved):
+        # When they are at rest the same instruction is looked at again.
+        process.pc -= 1
+        begin_moves_ahead(machine, process, ahead)
+        return
+    arm, goal = ahead.arm, request.goals[request.form.goal]
+    X_BW, X_MH = inverse(machine.base_pose(arm)), inverse(machine.state.tree.relation(moved, arm))
+    X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
+    # What its operand names may be another thing when the MOVE begins.
+    goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    request = request._replace(goals={request.form.goal: goal})
+    ahead = attrs.evolve(ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH))
+    if goes_over(request):
+        process.ahead = ahead
+        # What is worked out before the arm is there takes it for being there.
+        reached = machine.state.tree.set_pose(arm, machine.base_pose(arm) @ X_BH)
+        machine.replace_tree(reached, arm, request.span)
+    else:
+        begin_moves_ahead(machine, process, ahead)
+
+
+def begin_moves_ahead(machine: Machine, process: Process, ahead: MovesAhead) -> None:
+    """Begin the MOVEs that have waited for the next one, as one path that stops at its end."""
+    process.ahead = None
+    machine.update_hand_pose(ahead.arm, ahead.requests[0].span)
+    request = merged(ahead.requests, ahead.poses)
+    _begin_move(machine, process, request, ahead.arm, ahead.moved, implied=ahead.implied_affix)
+
+
+def _begin_move(
+    machine: Machine, process: Process, request: MoveRequest, arm: str, moved: str, *, implied: bool
+) -> None:
+    """Plan a MOVE and begin its first stage."""
     machine.state.idle_steps += _STEPS_PER_MOVE
     planned = _plan_stages(machine, process, request, arm, moved)
     stages = checked_stages(machine, process, request, arm, planned)
@@ -74,7 +117,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
         arm=arm,
         moved=moved,
         X_HM=machine.state.tree.relation(moved, arm),
-        span=step.span,
+        span=request.span,
         text=f"{subject} MOVE: {stages_text(request.form).replace(' / ', '; ')} {speed_text}",
         goal=_goal_name(machine, process, request),
         implied_affix=implied,
@@ -145,6 +188,8 @@ def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
     """Return the frame that a MOVE goes to, or the expression of it."""
     if request.joints is not None:
         return request.form.goal
+    if request.fixed:
+        return str(request.goals[request.form.goal].operand) or request.form.goal
     return machine.variable_name(process, request.begin.operands[1]) or request.form.goal
 
 
@@ -197,6 +242,8 @@ def _plan_stages(
     joints = _goal_joints(machine, process, request, arm)
 
     def pose(label: str) -> Array:
+        if label in request.fixed:
+            return request.fixed[label]
         if joints is not None and label == request.form.goal:
             return forward(cell_arm.arm, joints)
         return X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH
@@ -294,7 +341,7 @@ def _fail_move(
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = request.goals[label], stage.kind.value
-    is_frame = request.joints is None or label != request.form.goal
+    is_frame = not request.fixed and (request.joints is None or label != request.form.goal)
     frame = machine.variable_name(process, goal.operand) if is_frame else None
     secondary = machine.origin_labels(frame, f"`{label}` got its pose here") if frame else []
     raise machine.error(

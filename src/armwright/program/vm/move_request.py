@@ -1,9 +1,11 @@
 """What the instructions of one MOVE ask for, gathered and checked."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import takewhile
+from types import MappingProxyType
 from typing import NamedTuple
 
+from armwright.arrays import Array
 from armwright.motion.tool_limits import ToolLimits
 from armwright.program.bytecode.instructions import Code, Form, Instruction, Op, Operand
 from armwright.program.language.source import Span
@@ -35,18 +37,22 @@ class Goal(NamedTuple):
 
 
 class MoveRequest(NamedTuple):
-    """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is."""
+    """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is.
+
+    Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm.
+    """
 
     begin: Instruction
     form: Form
     goals: dict[str, Goal]
     speed: float
-    blend: float | None
+    blend: float | Array | None
     duration: float | None
     guards: list[Guard]
     span: Span
     joints: Sequence[float] | str | None = None
     tool: ToolLimits | None = None
+    fixed: Mapping[str, Array] = MappingProxyType({})
 
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
