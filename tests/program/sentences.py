@@ -20,6 +20,8 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "PULSE": ("PULSE", "pulse"),
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
+    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration"),
+    "CIRCULARLY": ("CIRCULARLY", "circularly"),
     "WITHIN": ("WITHIN", "within"),
     "WHEN": ("WHEN", "when"),
     "BRAKE": ("BRAKE", "brake"),

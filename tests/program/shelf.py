@@ -23,7 +23,7 @@ REJECTED = sorted((HERE / "rejected").rglob("*.rlo"))
 ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
 
 EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
-CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue) (.*)")
+CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|joints|targets) (.*)")
 STRICT = re.compile(r"// strict$", re.MULTILINE)
 OLD = re.compile(r"// std=83$", re.MULTILINE)
 IMPORT = re.compile(r"// import: (\S+): (.*)")
@@ -46,6 +46,8 @@ def cell_of(text: str) -> KnownCell | None:
         visions=frozenset(told["visions"]) if "visions" in told else None,
         inputs=frozenset(told["inputs"]) if "inputs" in told else None,
         analogue=frozenset(told.get("analogue", ())),
+        joints=dict(one.split() for one in told.get("joints", ())),
+        targets=dict(one.split(" of ") for one in told["targets"]) if "targets" in told else None,
         reach=float(told["reach"][0]) if "reach" in told else None,
     )
 

@@ -72,6 +72,7 @@ def test_run_time_pages_run() -> None:
         "E404",
         "E405",
         "E406",
+        "E407",
         "E504",
         "E505",
         "E506",
@@ -93,6 +94,7 @@ def test_run_time_pages_run() -> None:
         "W402",
         "W403",
         "W404",
+        "W405",
     ):
         assert "// run in " in find_page(code).wrong, code
 

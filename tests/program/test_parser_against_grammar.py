@@ -51,6 +51,8 @@ WORDS = {
         "log",
         "pulse",
         "within",
+        "circularly",
+        "velocity",
         "raise",
         "jam",
         "when",

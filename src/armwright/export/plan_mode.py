@@ -288,7 +288,7 @@ def _speed_part(stage: RunStage, solver: Solver) -> float:
     return float((stage.motion.peaks(1) / solver.arm.limits.speed).max())
 
 
-def _lines(stage: RunStage, poses: Array, blend: float | None, solver: Solver) -> MoveLines:
+def _lines(stage: RunStage, poses: Array, blend: float | Array | None, solver: Solver) -> MoveLines:
     """Return the statement for one straight line, or for several with rounded corners."""
     motion = stage.motion
     times = np.linspace(0.0, motion.duration, _LOOKS)
@@ -311,8 +311,10 @@ def _lines(stage: RunStage, poses: Array, blend: float | None, solver: Solver) -
     )
 
 
-def _zones(start: Array, poses: Sequence[Array] | Array, blend: float) -> Array:
+def _zones(start: Array, poses: Sequence[Array] | Array, blend: float | Array) -> Array:
     """Return from where on each corner is rounded [m]: as far as is asked for, and never beyond 0.4 of a leg."""
     corners = [start, *poses]
     legs = [float(np.linalg.norm(b[:3, 3] - a[:3, 3])) for a, b in pairwise(corners)]
-    return np.array([*(min(blend, _PART_OF_LEG * a, _PART_OF_LEG * b) for a, b in pairwise(legs)), 0.0])
+    asked = zip(np.broadcast_to(blend, len(poses) - 1).tolist(), pairwise(legs), strict=True)
+    rounded = (min(each, _PART_OF_LEG * a, _PART_OF_LEG * b) for each, (a, b) in asked)
+    return np.array([*rounded, 0.0])

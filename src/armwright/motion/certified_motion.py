@@ -138,6 +138,7 @@ def fastest(
     nominal: float,
     period: float | None = None,
     weak: bool = False,
+    ramp: float = 0.0,
 ) -> CertifiedMotion:
     """Return the fastest run along a followed path whose time is a mere parameter, inside all limits.
 
@@ -150,12 +151,13 @@ def fastest(
         nominal: how long it would take if no joint limited it [s].
         period: of the servo [s], to end on a whole number of them; any duration when left out.
         weak: whether a motion is run as it is where gravity alone takes more than a joint may give.
+        ramp: as for ``timed``.
 
     Raises:
         IncapableArmError: gravity alone takes more than a joint may give, and ``weak`` is not set.
     """
     solver, path, error = solver_of(arm), tracking.trajectory, tracking.error
-    run = timed(solver, path, np.ones(len(path.times) - 1))
+    run = timed(solver, path, np.ones(len(path.times) - 1), ramp=ramp)
     time = run.when(error.worst_time)
     trajectory, efforts, slower = _inside_efforts(solver, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal

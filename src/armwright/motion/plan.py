@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 
@@ -10,11 +11,14 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
+from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.motion.arc import arc, coarse_arc
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
+from armwright.motion.limited import limited_motion
 from armwright.motion.obstruction import Cause, PathError, cause_of, check_ends
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
@@ -22,6 +26,7 @@ from armwright.motion.rounded_corners import rounded_move
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_line
 from armwright.motion.through import through
+from armwright.motion.tool_limits import ToolLimits, tool_peaks
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
@@ -30,7 +35,10 @@ _FARTHEST = 1e6
 # Points of the tool along a smooth motion from which its length is summed.
 _LOOKS = 101
 
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND"]
+# A joint that moves at this part of its speed limit moves at it; a speed of which this part is reached is reached.
+_AT_LIMIT, _REACHED = 0.98, 0.98
+
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC"]
 
 
 @attrs.frozen(kw_only=True)
@@ -43,12 +51,15 @@ class Manner:
         period: of the servo [s]; stages last a whole number of it.
         around: how to go round what stops a straight line, see ``line_or_detour``; None to stop there. Only a LINE is
             bypassed: a path through several frames is run without a stop, unlike a detour of one of its parts.
+        tool: limits of the tool that are kept besides those of the joints; None for none. A speed of them is used
+            instead of that of the report's rule.
     """
 
     speed: float = 100.0
     deviation: float = 1e-3
     period: float = 1e-3
     around: DetourMethod | None = None
+    tool: ToolLimits | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -56,16 +67,19 @@ class StageGoal:
     """What one stage has to do.
 
     Attributes:
-        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop.
+        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop, ``ARC``
+            through the position of the first of two to the second.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
-        blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
+        joints: (n,) joint positions that a ``PTP`` is to end at, whose pose ``poses`` has; None for any that take it.
+        blend: how far from a corner the rounding may begin [m], one number or one for each; only for ``BLEND``.
         corner: how far a ``SPLINE`` may be off the straight legs, and pass a pose [m]; None for the report's own
             X-spline through the poses.
     """
 
     kind: StageKind
     poses: Array
-    blend: float | None = None
+    joints: Array | None = None
+    blend: float | Array | None = None
     corner: float | None = None
 
 
@@ -114,6 +128,8 @@ class PlannedStage:
             stops at every frame; None where there is nothing of the kind.
         detour: the detour, and its price; None where there is no obstacle, and of a SPLINE.
         goal: what it was planned for.
+        unmet: the speeds of the tool that were asked for and that the limits of the arm do not allow; the first are
+            those asked for, the second those that it reaches. None where the arm could do as asked.
     """
 
     kind: StageKind
@@ -125,6 +141,7 @@ class PlannedStage:
     obstacle: Obstacle | None = None
     detour: Detour | None = None
     goal: StageGoal | None = None
+    unmet: tuple[ToolLimits, ToolLimits] | None = None
 
 
 class StageError(ArmwrightError, ValueError):
@@ -159,6 +176,7 @@ def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Ma
         One planned stage per goal.
 
     Raises:
+        FlatArcError: the positions of an arc are on one line.
         StageError: a stage cannot be made from any configuration; it names the first obstacle of the nearest one, on a
             straight line also where a detour was searched for in vain.
         InvalidValueError: speed or deviation are out of range.
@@ -189,13 +207,35 @@ def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, num
     if number == len(goals):
         return []
     errors: list[StageError] = []
-    for stage in _candidates(arm, q, goals[number], manner, number):
+    for candidate in _candidates(arm, q, goals[number], manner, number):
+        stage = candidate if manner.tool is None else _with_tool_limits(arm, candidate, manner, manner.tool)
         try:
             following = _plan(arm, stage.trajectory(stage.trajectory.duration), goals, manner, number + 1)
             return [attrs.evolve(stage, goal=goals[number]), *following]
         except StageError as error:
             errors.append(error)
     raise errors[0]
+
+
+def _with_tool_limits(arm: AnyArm, stage: PlannedStage, manner: Manner, tool: ToolLimits) -> PlannedStage:
+    """Return a stage slowed so that the tool keeps its limits, with the speeds that the arm cannot reach."""
+    model, trajectory = solver_of(arm).arm, stage.trajectory
+    if not trajectory.duration:
+        return stage
+    factor = tool.slowing(model, trajectory)
+    if factor > 1:
+        slow, certificate = whole_ticks(trajectory.slowed(factor), manner.period), stage.certificate
+        stretch = slow.duration / trajectory.duration
+        certificate = None if certificate is None else certificate.retimed(stretch)
+        stage = attrs.evolve(stage, trajectory=slow, certificate=certificate)
+    reached = tool_peaks(model, stage.trajectory)
+    speeds = limited_motion(model, stage.trajectory).peaks(1) / model.all_limits.speed
+    too_fast = stage.kind != "PTP" and math.isfinite(tool.speed) and tool.speed > model.tool_speed
+    at_limit = too_fast or bool(speeds.max() > _AT_LIMIT)
+    # Where both are given, the one keeps the other from being reached.
+    is_met = reached.speed > _REACHED * tool.speed or reached.rotation > _REACHED * tool.rotation
+    asked = math.isfinite(tool.speed) or math.isfinite(tool.rotation)
+    return attrs.evolve(stage, unmet=(tool, reached)) if asked and at_limit and not is_met else stage
 
 
 def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[PlannedStage]:
@@ -205,9 +245,18 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
     if far.max() > _FARTHEST:
         worst = int(far.argmax())
         raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
+    if goal.kind == "PTP" and goal.joints is not None:
+        for violation in violations_of(solver_of(arm).arm, goal.joints.tolist()):
+            obstacle = _at_pose("limits", str(violation), 0, poses[0])
+            raise StageError(number, attrs.evolve(obstacle, joint=violation.joint))
+        yield _direct(arm, q, goal.joints, manner)
+        return
     if goal.kind == "PTP":
         # Planned as they are asked for: nearly always the first one does.
         yield from (_direct(arm, q, end, manner) for end in _configurations(arm, poses[0], q, number))
+        return
+    if goal.kind == "ARC":
+        yield _on_arc(arm, q, poses, manner, number)
         return
     path = Path(poses=np.concatenate([np.asarray(solver_of(arm).forward(q))[None], poses]))
     try:
@@ -220,18 +269,57 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
         yield bypass
 
 
+def _on_arc(arm: AnyArm, q: Array, poses: Array, manner: Manner, number: int) -> PlannedStage:
+    """Return the stage that follows an arc."""
+    solver = solver_of(arm)
+    through, end = poses
+    try:
+        try:
+            motion = coarse_arc(arm, q, through, end, deviation=manner.deviation, speed=manner.speed, tool=manner.tool)
+        except PathError:
+            check_ends(solver, Path(poses=np.stack([np.asarray(solver.forward(q)), end])), q)
+            raise
+    except PathError as error:
+        planned = arc(np.asarray(solver.forward(q)), through, end)
+        # That the goal itself cannot be taken is said of the way to it.
+        certain = error.fraction == 1 and not inverse(solver.arm, end).allowed
+        segment = 1 if certain else error.segment
+        part = planned.through if segment == 0 else 1 - planned.through
+        obstacle = Obstacle(
+            cause=error.cause,
+            reason=error.reason,
+            joint=error.joint,
+            pose=segment,
+            fraction=error.fraction,
+            length=planned.length * part,
+            place=planned.at(np.array(planned.part(segment, error.fraction)))[:3, 3],
+            certain=certain,
+        )
+        raise StageError(number, obstacle) from error
+    motion = motion.on_ticks(manner.period)
+    certificate = motion.certificate
+    return PlannedStage(
+        kind="ARC",
+        trajectory=motion.trajectory,
+        length=tool_path_length(arm, motion.trajectory),
+        certificate=certificate,
+        deviation=certificate.deviation,
+        slowed=certificate.slowed,
+    )
+
+
 def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> PlannedStage:
     """Return the stage that follows a path: a line, the report's spline, or rounded corners."""
     how = {"deviation": manner.deviation, "speed": manner.speed}
     stops, stopped_by = "", None
     if goal.kind == "LINE":
         try:
-            motion = coarse_line(arm, q, path.poses[1], **how)
+            motion = coarse_line(arm, q, path.poses[1], **how, tool=manner.tool)
         except PathError:
             check_ends(solver_of(arm), path, q)  # a goal that cannot be taken at all is said to be so
             raise
     elif goal.kind == "BLEND" or goal.corner is not None:
-        run = rounded_move(arm, path, q, corner=goal.corner, blend=goal.blend, **how)
+        run = rounded_move(arm, path, q, corner=goal.corner, blend=goal.blend, **how, tool=manner.tool)
         motion, stops, stopped_by = run.motion, run.stops, run.stopped_by
     else:
         motion = through(arm, path, q, **how)

@@ -31,9 +31,10 @@ from armwright.motion.limited import limited_positions
 from armwright.motion.obstruction import MAX_SLOWDOWN, PathError, check_ends
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.solver import AnyArm, solver_of
-from armwright.motion.straight import COARSE, coarse_line
+from armwright.motion.straight import COARSE, coarse_line, limited_time
 from armwright.motion.timing_law import TimedPath, timed
 from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
+from armwright.motion.tool_limits import ToolLimits
 from armwright.motion.tool_path import tool_path
 from armwright.motion.tracking import Task, Tracking, track
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
@@ -112,6 +113,7 @@ class _Task(NamedTuple):
         q_start: (n,) present joint positions.
         deviation: of a single line [m].
         speed: 1 to 120.
+        tool: further limits of the tool; None for none.
         closer: how near the joints keep the tool to its rounded path [m].
         off: how far the path may be off besides what the corners ask for [m].
         allowed: how far the tool may be from the straight legs; of a blend, what follows from its width.
@@ -124,6 +126,7 @@ class _Task(NamedTuple):
     q_start: Array
     deviation: float
     speed: float
+    tool: ToolLimits | None
     closer: float
     off: float
     allowed: Tolerance
@@ -137,7 +140,8 @@ def rounded_move(
     deviation: float,
     speed: float,
     corner: float | None = None,
-    blend: float | None = None,
+    blend: float | Array | None = None,
+    tool: ToolLimits | None = None,
 ) -> RoundedMotion:
     """Plan a run straight from pose to pose that rounds its corners and rests only at both ends.
 
@@ -154,7 +158,9 @@ def rounded_move(
         corner: how far the tool may be from the straight legs, and pass a pose, at most [m]; the orientation may be
             off by ``ROTATION_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
             that, and within 0.5 mm. Such a run is never slower than the legs one by one.
-        blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle.
+        blend: instead of it, how far from a pose its rounding may begin [m], one number or one for each pose between
+            the ends; where a leg is short, at its middle.
+        tool: as for ``certified_line``.
 
     Returns:
         The run. It is slowed for the limits of the efforts where that helps, with ``corner`` no further than the legs
@@ -165,8 +171,8 @@ def rounded_move(
         InvalidValueError: a number is out of range.
     """
     for what, value in (("blend", blend), ("corner", corner), ("deviation", deviation)):
-        if value is not None and not 0 < value < np.inf:
-            raise InvalidValueError(f"{what}: expected more than 0 m, got {value:g}")
+        if value is not None and not ((np.asarray(value) > 0) & (np.asarray(value) < np.inf)).all():
+            raise InvalidValueError(f"{what}: expected more than 0 m, got {np.min(value):g}")
     solver = solver_of(arm)
     together = NEGLIGIBLE if corner is None else max(min(_TOGETHER * corner, _MIDDLE / 2), NEGLIGIBLE)
     corners = _apart(path.poses, together)
@@ -174,19 +180,20 @@ def rounded_move(
         return RoundedMotion(motion=standstill(solver, q_start, tolerance(deviation if corner is None else corner)))
     check_ends(solver, path, q_start)
     deviation = min(deviation, COARSE[-1])
-    legs = _legs(solver.arm, path, corners, speed)
+    legs = _legs(solver.arm, path, corners, speed, tool)
     allowed = deviation if corner is None else corner
     closer = max(min(deviation, allowed), min(_CLOSER * _NEAREST, allowed)) / _CLOSER
     line_deviation = closer + (together if len(corners) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
     half = np.minimum(legs.lengths[:-1], legs.lengths[1:]) / 2
-    widths = np.minimum(half, np.inf if blend is None else blend)
+    of_each = np.broadcast_to(np.inf if blend is None else blend, len(path.poses) - 2)
+    widths = np.minimum(half, of_each[np.array(corners[1:-1], dtype=np.intp) - 1])
     if corner is not None:
         widths = _blend_widths(legs, half, corner, line_deviation)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
     bound = Tolerance(line_deviation + miss, ROTATION_PER_METRE * line_deviation + twist)
     if corner is not None:
         bound = tolerance(corner)
-    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, line_deviation, bound)
+    task = _Task(arm, path, legs, widths, q_start, deviation, speed, tool, closer, line_deviation, bound)
     return _without_stop(task) if corner is None else _never_slower(task)
 
 
@@ -236,13 +243,17 @@ def _apart(poses: Array, together: float) -> list[int]:
     return [*corners, last]
 
 
-def _legs(arm: Arm, path: Path, corners: list[int], speed: float) -> _Legs:
+def _legs(arm: Arm, path: Path, corners: list[int], speed: float, tool: ToolLimits | None) -> _Legs:
     X = path.poses[corners]
     lengths = Path(poses=X).lengths()
     R = X[:, :3, :3]
     rates = np.diff(X[:, :3, 3], axis=0) / lengths[:, None]
     turns = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / lengths[:, None]
     speeds = np.array([report_speed(arm, A[:3, 3], B[:3, 3], speed) for A, B in pairwise(X)])
+    if tool is not None:
+        shifts, angles = np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=-1), np.linalg.norm(turns, axis=-1) * lengths
+        legs = zip(shifts.tolist(), angles.tolist(), speeds.tolist(), strict=True)
+        speeds = lengths / np.array([limited_time(arm, *leg, tool) for leg in legs])
     bend, twist = (np.linalg.norm(np.diff(each, axis=0), axis=-1) for each in (rates, turns))
     return _Legs(X, corners, lengths, speeds, bend, twist)
 
@@ -321,7 +332,8 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, TimedPath]:
     except PathError as error:
         raise error.restated(legs.numbers[error.segment + 1] - 1, str(error)) from None
     caps = _caps(tracked.trajectory.times, times, widths / top, legs.speeds / top)
-    return tracked, timed(solver, tracked.trajectory, caps)
+    ramp = 0.0 if task.tool is None else top / task.tool.acceleration
+    return tracked, timed(solver, tracked.trajectory, caps, ramp=ramp)
 
 
 def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
@@ -367,7 +379,8 @@ def _with_stops(task: _Task) -> CertifiedMotion | None:
     lines: list[CertifiedMotion] = []
     for i in task.legs.numbers[1:]:
         try:
-            lines.append(coarse_line(task.arm, q, task.path.poses[i], deviation=task.deviation, speed=task.speed))
+            goal, how = task.path.poses[i], {"deviation": task.deviation, "speed": task.speed}
+            lines.append(coarse_line(task.arm, q, goal, **how, tool=task.tool))
         except PathError:
             return None
         q = lines[-1].trajectory(lines[-1].trajectory.duration)

@@ -19,14 +19,17 @@ from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
 from armwright.motion.tolerance import Tolerance, tolerance
+from armwright.motion.tool_limits import ToolLimits
 from armwright.motion.tracking import Task, check_velocities, track
 from armwright.spatial.rotations import rotation_vector
 
 # Part of the time in which the tool gathers speed, and again in which it loses it, by the speed that is asked for.
-_RAMP = 0.25
+RAMP = 0.25
 # Of an allowed deviation of a line in a program no more is used than the first of these that it allows and with which
 # the line can be run [m].
 COARSE = (1e-3, 2e-3, 5e-3)
+# With limits of the tool a line is kept so closely [m], so that its speed is steady.
+_STEADY = 2e-5
 # Knots to begin with, at least and at most.
 _MIN_KNOTS, _MAX_KNOTS = 9, 1000
 
@@ -81,6 +84,7 @@ def certified_line(
     period: float | None = None,
     diagnose: bool = True,
     weak: bool = False,
+    tool: ToolLimits | None = None,
 ) -> CertifiedMotion:
     """Plan a straight line as ``straight_line`` does.
 
@@ -93,6 +97,7 @@ def certified_line(
         period: the same.
         diagnose: whether it is searched for what really stops a line: not for those who try many lines.
         weak: as for ``fastest``.
+        tool: further limits of the tool; its speed is used instead of that of the report's rule.
     """
     solver = solver_of(arm)
     q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
@@ -101,30 +106,34 @@ def certified_line(
         raise PathError("limits", 0, 0.0, f"at the start {reason}", joint=violation.joint, reason=reason)
     A = np.asarray(solver.forward(q))
     rotation = rotation_vector(A[:3, :3].T @ B[:3, :3])
-    even = even_time(solver.arm, A, B, rotation, speed)
+    even = even_time(solver.arm, A, B, rotation, speed, tool=tool)
     if even is None:
         return standstill(solver, q, allowed)
     motion = line(A, B, rotation, even, near=allowed.position)
-    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_requested_time, even))
+    task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(requested_time, even))
     tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
     check_velocities(task, tracked)
-    nominal = even / (1 - _RAMP)
-    return fastest(solver, tracked, allowed, nominal=nominal, period=period, weak=weak)
+    ramp = 0.0 if tool is None else math.dist(A[:3, 3], B[:3, 3]) / even / tool.acceleration
+    nominal = max(even / (1 - RAMP), even + ramp)
+    return fastest(solver, tracked, allowed, nominal=nominal, period=period, weak=weak, ramp=ramp)
 
 
-def coarse_line(arm: AnyArm, q_start: Array, X_goal: Array, *, deviation: float, speed: float) -> CertifiedMotion:
+def coarse_line(
+    arm: AnyArm, q_start: Array, X_goal: Array, *, deviation: float, speed: float, tool: ToolLimits | None = None
+) -> CertifiedMotion:
     """Return the line of a program: kept closer than asked where that is no obstruction, run even by a weak arm.
 
     More than a millimetre is not used but where a line can be run for it; more than 5 mm would only rotate the tool.
+    Where the tool has limits of its own, less is tried first: the nearer it is to the line, the steadier is its speed.
 
     Raises:
         PathError: as for ``straight_line``.
         ArmwrightError: as for ``straight_line``, but for an arm whose joints cannot hold it up.
     """
     errors: list[PathError] = []
-    for tried in coarse_deviations(deviation):
+    for tried in tried_deviations(deviation, tool):
         try:
-            return certified_line(arm, q_start, X_goal, tolerance(tried), speed=speed, weak=True)
+            return certified_line(arm, q_start, X_goal, tolerance(tried), speed=speed, weak=True, tool=tool)
         except PathError as error:
             errors.append(error)
             if error.cause == "reach":  # a pose out of reach is so for every deviation
@@ -137,14 +146,22 @@ def coarse_deviations(deviation: float) -> list[float]:
     return [each for each in COARSE if each <= deviation] or [deviation]
 
 
+def tried_deviations(deviation: float, tool: ToolLimits | None) -> list[float]:
+    """Return the deviations that a path is tried with [m]: close ones first where the tool has limits of its own."""
+    coarse = coarse_deviations(deviation)
+    return coarse if tool is None else [min(_STEADY, deviation), *coarse]
+
+
 def requested_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | None:
     """Return the line from A to B at the speed of the report's rule, whatever the joints; None for one of no length."""
     rotation = rotation_vector(A[:3, :3].T @ B[:3, :3])
     even = even_time(arm, A, B, rotation, speed)
-    return None if even is None else line(A, B, rotation, even, near=0.0, ramp=_RAMP)
+    return None if even is None else line(A, B, rotation, even, near=0.0, ramp=RAMP)
 
 
-def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> float | None:
+def even_time(
+    arm: Arm, A: Array, B: Array, rotation: Array, speed: float, *, tool: ToolLimits | None = None
+) -> float | None:
     """Return how long a line takes at its full speed throughout [s]; None where it has no length.
 
     Args:
@@ -153,6 +170,7 @@ def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> fl
         B: (4, 4) pose at the end.
         rotation: (3,) rotation vector from start to end [rad].
         speed: 1 to 120.
+        tool: further limits of the tool; its speed is used instead of that of the report's rule.
 
     Raises:
         InvalidValueError: the speed is out of range.
@@ -163,7 +181,26 @@ def even_time(arm: Arm, A: Array, B: Array, rotation: Array, speed: float) -> fl
     if length <= NEGLIGIBLE:
         return None
     check_reach(arm)
-    return length / report_speed(arm, A[:3, 3], B[:3, 3], speed)
+    report = report_speed(arm, A[:3, 3], B[:3, 3], speed)
+    if tool is None:
+        return length / report
+    return limited_time(arm, math.dist(A[:3, 3], B[:3, 3]), math.hypot(*rotation), report, tool)
+
+
+def limited_time(arm: Arm, shift: float, angle: float, report: float, tool: ToolLimits) -> float:
+    """Return how long a path takes at its full speed throughout, where the tool has limits [s].
+
+    Args:
+        arm: the arm.
+        shift: length of the path [m].
+        angle: by which the tool turns on it [rad].
+        report: speed by the report's rule [m/s].
+        tool: the limits.
+    """
+    aimed = tool.aimed
+    given = math.isfinite(tool.speed)
+    by_rule = (TURN_RADIUS * angle if given else max(shift, TURN_RADIUS * angle)) / report
+    return max(by_rule, shift / min(aimed.speed, arm.tool_speed), aimed.even_time(shift, angle))
 
 
 def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
@@ -174,14 +211,14 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
     return np.asarray(motion.duration * (np.arange(last + 1) / last))
 
 
-def _requested_time(even: float, t: Array) -> Array:
+def requested_time(even: float, t: Array) -> Array:
     """Return when times of a line at even speed are passed where the tool gathers speed first, and loses it, evenly.
 
     Args:
         even: the duration at even speed [s].
         t: (k,) [s].
     """
-    ramp = _RAMP * even / (1 - _RAMP)
+    ramp = RAMP * even / (1 - RAMP)
     near = np.minimum(t, even - t)
     after = np.where(near < ramp / 2, np.sqrt(2 * ramp * np.maximum(near, 0.0)), near + ramp / 2)
     return np.where(t < even / 2, after, even + ramp - after)

@@ -146,16 +146,17 @@ class _Run(NamedTuple):
         return float(self.times[-1]) * max(1.0, self.most)
 
 
-def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
+def timed(solver: Solver, path: Trajectory, caps: Array, *, ramp: float = 0.0) -> TimedPath:
     """Return a run along a path, from rest to rest, inside the limits of speed and acceleration of the joints.
 
     Args:
         solver: the arm, with n joints.
         path: cubics with continuous second derivatives.
         caps: (m,) the largest s' on each of its m segments.
+        ramp: from rest to the full speed of the path no less than this is to be taken [s].
     """
     arm, limits = solver.arm, solver.arm.all_limits
-    grid = _gridded(solver, limited_motion(arm, path), caps)
+    grid = _gridded(solver, limited_motion(arm, path), caps, ramp)
     run = _smooth(grid)
     terms, speed, acceleration = composed_peaks(grid.cubics, run.law, run.intervals, run.times, solver.run)
     over = max(
@@ -166,7 +167,7 @@ def timed(solver: Solver, path: Trajectory, caps: Array) -> TimedPath:
     )
     terms *= (over ** -np.arange(terms.shape[1], dtype=np.float64))[:, None]
     trajectory = Trajectory.of_planner(run.times * over, terms if len(speed) == arm.n else terms[:, :, : arm.n].copy())
-    factor = trajectory.duration / _allowed(grid.even + _RAMP)
+    factor = trajectory.duration / _allowed(grid.even + max(_RAMP, ramp))
     because = _binding(arm, run) if factor > 1 else None
     return TimedPath(trajectory, factor, because, run, speed / over, acceleration / over**2)
 
@@ -176,12 +177,12 @@ def _allowed(shortest: float) -> float:
     return shortest + min(_COST * shortest, _MAX_LENGTH)
 
 
-def _gridded(solver: Solver, path: Trajectory, caps: Array) -> _Grid:
+def _gridded(solver: Solver, path: Trajectory, caps: Array, ramp: float) -> _Grid:
     """Return a path with every segment cut into equal parts."""
     limits = solver.arm.all_limits
     m, _, n = path.coefficients.shape
     finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
-    ramp = 0.0 if np.isfinite(limits.acceleration).all() else _RAMP
+    ramp = max(ramp, 0.0 if np.isfinite(limits.acceleration).all() else _RAMP)
     inputs = [path.times, path.coefficients, caps, limits.speed, limits.acceleration, np.array([ramp])]
     of_rows = m * finer, 1 + len(_PARTS) * (1 + 2 * n)
     times, cubics, fine_caps, a, b, squares, facts = solver.run(

@@ -120,7 +120,8 @@ class StageRow:
         t1: when it ended [s].
         line: line of the program, from 1.
         arm: name of the arm.
-        kind: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND`` of a program; ``JOINT`` or ``HAND`` of a move through poses.
+        kind: ``PTP``, ``LINE``, ``ARC``, ``SPLINE`` or ``BLEND`` of a program; ``JOINT`` or ``HAND`` of a move through
+            poses.
         to: its target frames; the last is the goal.
         speed: the speed in the program, 100 being normal.
         peak_speed: n largest joint speeds [rad/s] or [m/s].
@@ -136,7 +137,7 @@ class StageRow:
     t1: float
     line: int
     arm: str
-    kind: Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"]
+    kind: Literal["PTP", "LINE", "ARC", "SPLINE", "BLEND", "JOINT", "HAND"]
     to: Sequence[str]
     speed: float
     peak_speed: Sequence[float]

@@ -20,7 +20,7 @@ from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCo
 from armwright.program.language.source import Source
 from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, is_module
 from armwright.program.syntax.nodes import ArmName, Name
-from armwright.program.syntax.tree import Blend, Directly, Move, Straightly, Via, clause_word
+from armwright.program.syntax.tree import Blend, Circularly, Directly, Move, Straightly, Via, clause_word
 
 _NORMAL_SPEED = 100.0
 # Speeds of a MOVE, and the longest approach [m].
@@ -276,7 +276,7 @@ class ProgramText:
         """
         self.require_statements()
         move = self._move_in(line)
-        plain = next((it for it in move.clauses if isinstance(it, Directly | Straightly)), None)
+        plain = next((it for it in move.clauses if isinstance(it, Directly | Straightly | Circularly)), None)
         if plain is not None:
             word = clause_word(type(plain))
             raise ProgramTextError(f"the MOVE in line {line} goes {word}, which cannot be combined with VIA")

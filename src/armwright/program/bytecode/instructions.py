@@ -109,12 +109,18 @@ class Op(enum.StrEnum):
     MVBEG = "MVBEG", "FP"  # moved, goal: a motion begins
     MVDIR = "MVDIR", ""  # the shortest way in joint space
     MVSTR = "MVSTR", ""  # one straight line
+    MVCIR = "MVCIR", ""  # one arc through the frame of MVVIA
+    MVJNT = "MVJNT", "N+"  # numbers: the goal is these joint positions, whatever MVBEG says of it
+    MVTGT = "MVTGT", "w"  # joint target of the cell: the goal is that
     MVVIA = "MVVIA", "P+"  # frames: through these without a stop
     MVAPP = "MVAPP", "P"  # frame: approach point
     MVDEP = "MVDEP", "P"  # frame: departure point
     MVSPD = "MVSPD", "N"  # number: speed
     MVBLD = "MVBLD", "N"  # number: how far from via points corners may be rounded
     MVDUR = "MVDUR", "N"  # number: how long it shall take
+    MVVEL = "MVVEL", "N"  # number: largest speed of the tool point
+    MVROT = "MVROT", "N"  # number: largest angular speed of the tool
+    MVACC = "MVACC", "N"  # number: largest change of the speed of the tool point
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
@@ -152,6 +158,15 @@ class Op(enum.StrEnum):
     STOP = "STOP", ""  # end of the text
     PRINT = "PRINT", "t+"  # values and texts
     LOG = "LOG", "sst+"  # name, titles of the columns as a line of CSV, values and texts
+
+
+# What may stand between MVBEG and MVEND.
+MOVE_PARTS = frozenset(
+    (
+        *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
+        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVON),
+    )
+)
 
 
 @attrs.frozen
@@ -195,12 +210,13 @@ class MotionKind(enum.StrEnum):
     ``PTP``: all joints at once, at rest at both ends. ``LINE``: the moved frame on a straight line.
     ``SPLINE``: past frames without a stop, at rest at the last; straight between corners that are rounded as far as
     the cell allows, or through the frames by the report's X-spline in RLO-83. ``BLEND``: the same, rounded from a
-    distance on that the program tells.
+    distance on that the program tells. ``ARC``: the moved frame on an arc of a circle through a frame.
     """
 
     PTP = "PTP"
     LINE = "LINE"
     SPLINE = "SPLINE"
+    ARC = "ARC"
     BLEND = "BLEND"
 
 
@@ -215,6 +231,7 @@ class Form:
         departure: where the start is left to in a straight line.
         straight: one straight line.
         blend: whether the corners at via points are rounded.
+        circular: one arc through what lies on the way.
     """
 
     goal: str
@@ -223,6 +240,7 @@ class Form:
     departure: str | None = None
     straight: bool = False
     blend: bool = False
+    circular: bool = False
 
     @property
     def direct(self) -> bool:
@@ -248,7 +266,7 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
     if form.departure:
         stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.departure,)))
     end = form.approach or form.goal
-    past = MotionKind.BLEND if form.blend else MotionKind.SPLINE
+    past = MotionKind.ARC if form.circular else MotionKind.BLEND if form.blend else MotionKind.SPLINE
     gross = past if form.via else MotionKind.LINE if form.straight else MotionKind.PTP
     stages.append(StagePlan(kind=gross, frames=(*form.via, end)))
     if form.approach:

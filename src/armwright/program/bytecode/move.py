@@ -6,18 +6,23 @@ import attrs
 
 from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import LATER
-from armwright.program.bytecode.instructions import Form, Op, stages_text
+from armwright.program.bytecode.instructions import Form, Op, Operand, stages_text
+from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.syntax import tree
 
 # In the order of the listing: the way, the points on it, the speed.
 _CLAUSES: dict[type, Op] = {
     tree.Straightly: Op.MVSTR,
+    tree.Circularly: Op.MVCIR,
     tree.Departure: Op.MVDEP,
     tree.Via: Op.MVVIA,
     tree.Approach: Op.MVAPP,
     tree.Speed: Op.MVSPD,
     tree.Blend: Op.MVBLD,
     tree.Duration: Op.MVDUR,
+    tree.Velocity: Op.MVVEL,
+    tree.Rotation: Op.MVROT,
+    tree.Acceleration: Op.MVACC,
 }
 
 
@@ -25,7 +30,9 @@ def move(context: Context, node: tree.Move) -> None:
     """Generate one MOVE: its places, its instructions in one stretch, then conditions and actions of its guards."""
     out = context.out
     guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
-    moved, goal = context.out.value(node.moved), out.value(node.goal)
+    moved = out.value(node.moved)
+    joints = _joints(context, node.goal)
+    goal = out.value(node.goal) if joints is None else moved
     # Places are worked out before the motion begins, so that its own instructions follow one another.
     kinds = list(_CLAUSES)
     clauses = sorted((one for one in node.clauses if type(one) in kinds), key=lambda one: kinds.index(type(one)))
@@ -34,6 +41,9 @@ def move(context: Context, node: tree.Move) -> None:
     form = form_of(node, context.text)
     if form.direct:
         out.emit(Op.MVDIR, span=node.span)
+    if joints is not None:
+        op, operands = joints
+        out.emit(op, *operands, span=node.goal.span)
     for op, span, operands in parts:
         out.emit(op, *operands, span=span)
     conditions = [(guard, out.emit(Op.MVON, LATER, out.passing(), LATER, span=guard.head)) for guard in guards]
@@ -47,6 +57,16 @@ def move(context: Context, node: tree.Move) -> None:
         for guard, number in conditions:
             _guard(context, guard, number)
         out.patch_jump(over)
+
+
+def _joints(context: Context, goal: tree.Expression) -> tuple[Op, list[Operand]] | None:
+    """Return the part of a MOVE that gives its goal by joint positions; None where that is a frame."""
+    scope = context.out.scope
+    if not isinstance(goal, tree.Function) or not is_joints(scope, goal):
+        return None
+    if (name := joint_target(scope, goal)) is not None:
+        return Op.MVTGT, [name.key]
+    return Op.MVJNT, [context.out.value(argument) for argument in goal.arguments]
 
 
 def _guard(context: Context, guard: tree.On, number: int) -> None:
@@ -75,6 +95,7 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
         departure=ends.get(tree.Departure),
         straight=tree.Straightly in clauses,
         blend=tree.Blend in clauses,
+        circular=tree.Circularly in clauses,
     )
 
 

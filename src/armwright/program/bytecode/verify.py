@@ -16,7 +16,16 @@ import numpy as np
 
 from armwright.arrays import LARGEST
 from armwright.errors import counted
-from armwright.program.bytecode.instructions import Code, Constant, JumpTarget, Op, Operand, ProcedureCode, Text
+from armwright.program.bytecode.instructions import (
+    MOVE_PARTS,
+    Code,
+    Constant,
+    JumpTarget,
+    Op,
+    Operand,
+    ProcedureCode,
+    Text,
+)
 from armwright.program.bytecode.verifier import (
     OF_KIND,
     Attempt,
@@ -83,8 +92,8 @@ _SIGNATURES = {op: _signature(op) for op in Op}
 _OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL, Op.ELEM, Op.CALLF, Op.JZ, Op.RET}
 # All that a function may do.
 _OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RAISE, Op.RETV, Op.NORET}
-# What may follow MVBEG and the parts of a MOVE.
-_PARTS = {Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON}
+# The parts of a MOVE of which an arc has only two.
+_WAYS = {Op.MVSTR, Op.MVCIR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVBLD, Op.MVJNT, Op.MVTGT}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION, Routine.WATCH),
@@ -167,11 +176,24 @@ def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
         op = step.op
         if (before is Op.FORK) != (op is Op.JOIN or (op is Op.FORK and before is Op.FORK)):
             yield CodeError(number, "expected FORKs and their JOIN without other instructions in between")
-        if (before in _PARTS | {Op.MVBEG}) != (op in _PARTS | {Op.MVEND}):
+        if (before in MOVE_PARTS | {Op.MVBEG}) != (op in MOVE_PARTS | {Op.MVEND}):
             yield CodeError(number, "expected the parts of a MOVE in sequence, from MVBEG to MVEND")
-        if number in targets and before in _PARTS | {Op.MVBEG, Op.FORK}:
+        if op is Op.MVCIR and not _is_arc(code, number):
+            yield CodeError(number, "expected MVCIR with one frame in MVVIA, and without MVSTR, MVDEP, MVAPP and MVBLD")
+        if number in targets and before in MOVE_PARTS | {Op.MVBEG, Op.FORK}:
             yield CodeError(number, "a jump must not lead into the middle of a MOVE or of FORKs")
         before = op
+
+
+def _is_arc(code: Code, number: int) -> bool:
+    """Whether a MOVE with MVCIR has nothing else that says which way it goes but one frame to pass."""
+    first = last = number
+    while code.instructions[first - 1].op in MOVE_PARTS:
+        first -= 1
+    while code.instructions[last + 1].op in MOVE_PARTS:
+        last += 1
+    parts = [step for step in code.instructions[first : last + 1] if step.op in _WAYS]
+    return [(step.op, len(step.operands)) for step in parts] == [(Op.MVCIR, 0), (Op.MVVIA, 1)]
 
 
 def _wrong_ends(code: Code) -> Iterator[CodeError]:

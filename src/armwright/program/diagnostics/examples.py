@@ -1,12 +1,12 @@
 """Trying out the programs of the pages: their comments say in what cell, in what language, within what limits.
 
 ``// std=83`` and ``// strict`` are the options of the command line. ``// cell: arms ARM_1, ARM_2`` tells what a
-program is checked against, and so do ``frames``, ``devices``, ``visions``, ``inputs`` and ``analogue``;
-``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings, and ``// module: grip.rlo: MODULE grip ; END.``
-has the text of a module. ``// run in one_arm`` has the program run in a
-cell that comes with the pages, with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command
-line; ``// effort: 60 in joint 2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported
-afterwards, by ``armwright.export``.
+program is checked against, and so do ``frames``, ``devices``, ``visions``, ``inputs``, ``analogue``, ``joints`` and
+``targets``; ``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings, and ``// module: grip.rlo: MODULE
+grip ; END.`` has the text of a module. ``// run in one_arm`` has the program run in a cell that comes with the pages,
+with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command line; ``// effort: 60 in joint
+2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported afterwards, by
+``armwright.export``.
 """
 
 import re
@@ -36,7 +36,7 @@ _DETOUR_METHODS: Mapping[str, Around] = {"via": "via", "damped": "damped"}
 _EFFORT = re.compile(r"^// effort: (\d+) in joint (\d)$", re.MULTILINE)
 _LIMIT = re.compile(r"^// limits: (steps|depth|time) (\d+)$", re.MULTILINE)
 _PHYSICS = re.compile(r"^// physics$", re.MULTILINE)
-_KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions|inputs|analogue) (.+)$", re.MULTILINE)
+_KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions|inputs|analogue|joints|targets) (.+)$", re.MULTILINE)
 _IMPORT = re.compile(r"^// import: (\S+): (.+)$", re.MULTILINE)
 _MODULE = re.compile(r"^// module: (\S+): (.+)$", re.MULTILINE)
 _OLD = re.compile(r"^// std=83$", re.MULTILINE)
@@ -113,6 +113,8 @@ def _known_cell(text: str) -> KnownCell | None:
         visions=frozenset(known["visions"]) if "visions" in known else None,
         inputs=frozenset(known["inputs"]) if "inputs" in known else None,
         analogue=frozenset(known.get("analogue", ())),
+        joints=dict(one.split() for one in known.get("joints", ())),
+        targets=dict(one.split(" of ") for one in known["targets"]) if "targets" in known else None,
     )
 
 

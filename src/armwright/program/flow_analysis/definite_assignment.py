@@ -6,7 +6,7 @@ from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any_element, is_arm
-from armwright.program.semantics.builtins import WITH_DEVICE, WITH_INPUT, WITH_NAME
+from armwright.program.semantics.builtins import WITH_DEVICE, WITH_INPUT, WITH_NAME, is_joints, joint_target
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.syntax import tree
 
@@ -32,7 +32,9 @@ def require_value(state: FlowState, *nodes: tree.Expression | None) -> None:
         elif isinstance(node, tree.Function):
             if node.name.key in WITH_DEVICE and node.name.key not in state.symbols.procedures:
                 _check_signal(state, node)
-            waiting += reversed(node.arguments if node.name.key not in WITH_NAME else ())
+            scope = state.now.scope
+            has_names = node.name.key in WITH_NAME or (is_joints(scope, node) and joint_target(scope, node) is not None)
+            waiting += reversed(() if has_names else node.arguments)
         elif isinstance(node, tree.ArmName):
             state.check_arm(node.key, node.span)
         elif isinstance(node, tree.Unary):

@@ -1,14 +1,16 @@
 """MOVE: the arm that moves, what it carries, and where it arrives."""
 
+from armwright.errors import closest, counted
 from armwright.program.flow_analysis import plausibility
 from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.definite_assignment import require_indices, require_value
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import warn_of_implicit_unfix
 from armwright.program.flow_analysis.state import LAST, FlowState
-from armwright.program.language.diagnostic import Label, Severity, labels
+from armwright.program.language.diagnostic import Label, Severity, did_you_mean, labels
 from armwright.program.language.names import is_any_element, is_arm
-from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
+from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, dimension
+from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import expression_text
 from armwright.program.semantics.move import SPEED_NOTE
@@ -48,11 +50,13 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     state.record(node, arm, implied=implied)
     targets = _targets(node)
     require_value(state, *targets)
+    if isinstance(node.goal, tree.Function) and is_joints(state.now.scope, node.goal):
+        _check_joints(state, node.goal, arm)
     plausibility.check_lengths(state, *targets)
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _check_speed(state, clause.value)
-        elif isinstance(clause, tree.Blend | tree.Duration):
+        elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
             require_value(state, clause.value)
     if arm is None:
         return None
@@ -161,6 +165,35 @@ def _note_relative_goal(state: FlowState, node: tree.Move, arm: str) -> None:
     text = f"the goal `{expression_text(node.goal)}` is attached to {arm} and moves with it"
     note = "the pose of the goal at the start of the motion is used, so the motion is relative to the tool"
     state.report("L302", text, node.goal.span, f"is attached to {arm}", note=note)
+
+
+def _check_joints(state: FlowState, goal: tree.Function, arm: str | None) -> None:
+    """Check joint positions against the arm, as far as the cell says what that is."""
+    cell, name = state.cell, joint_target(state.now.scope, goal)
+    if cell is None or arm is None:
+        return
+    if name is not None:
+        if cell.targets is not None and name.key not in cell.targets:
+            note = f"joint targets of the cell: {', '.join(sorted(cell.targets)) or 'none'}"
+            text, advice = f"the cell has no joint target `{name.text}`", did_you_mean(closest(name.text, cell.targets))
+            state.report("E242", text, name.span, "no such joint target", note=note, advice=advice)
+        elif cell.targets is not None and cell.targets[name.key] != arm:
+            text = f"joint target `{name.text}` is one of {cell.targets[name.key]}, not of {arm}"
+            state.report("E242", text, name.span, "of another arm")
+        return
+    joints = cell.joints.get(arm)
+    if joints is None or not goal.arguments:
+        return
+    if len(joints) != len(goal.arguments):
+        text = f"{arm} has {counted(len(joints), 'joint')}, but JOINTS is given {len(goal.arguments)}"
+        state.report("E242", text, goal.span, f"expected {len(joints)} positions")
+        return
+    for number, (argument, letter) in enumerate(zip(goal.arguments, joints, strict=True), 1):
+        if isinstance(argument, tree.Number) and argument.unit is not None:
+            kind, verb = ("angle", "turns") if letter == "R" else ("length", "slides")
+            if dimension(argument.unit) != kind:
+                text = f"joint {number} of {arm} {verb}, but `{argument.text}` is no {kind}"
+                state.report("E242", text, argument.span, f"expected {'an' if kind == 'angle' else 'a'} {kind}")
 
 
 def _check_speed(state: FlowState, node: tree.Expression) -> None:

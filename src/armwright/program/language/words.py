@@ -67,6 +67,9 @@ TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
 HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE")
 # How a parameter is passed, in front of its name.
 PARAMETER_MODES = ("IN", "INOUT")
+# Clauses of MOVE that are words only where a clause may begin.
+PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
+WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION")
 # What starts a statement only in front of a name.
 STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE")
 # What starts a statement only in front of a text.
@@ -78,6 +81,8 @@ WORDS_IN_CONTEXT = frozenset(
         *TYPES_IN_CONTEXT,
         *HEADERS_IN_CONTEXT,
         *PARAMETER_MODES,
+        *PLAIN_CLAUSES_IN_CONTEXT,
+        *WITH_CLAUSES_IN_CONTEXT,
         *STATEMENTS_BEFORE_NAME,
         *STATEMENTS_BEFORE_TEXT,
         "AS",

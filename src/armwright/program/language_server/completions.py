@@ -21,6 +21,7 @@ from armwright.program.language.words import (
     STATEMENTS_BEFORE_TEXT,
     VALUES,
     VOCABULARIES,
+    WITH_CLAUSES_IN_CONTEXT,
     WORDS_IN_CONTEXT,
     Standard,
 )
@@ -30,7 +31,7 @@ from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, MEASURES, WITH_AXIS, WITH_INPUT
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, MEASURES, WITH_AXIS, WITH_INPUT
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -64,10 +65,11 @@ _SNIPPETS = {
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
     "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
+_WITH_CLAUSES = (*VOCABULARIES[Standard.RLO_2].with_clauses, *WITH_CLAUSES_IN_CONTEXT)
 # How a word that wants more is written on.
 _WORD_SNIPPETS = {
     "VIA": "VIA (${1:point})",
-    **{word: f"{word} = ${{1:value}}" for word in ("APPROACH", "DEPARTURE", "SPEED", "BLEND", "DURATION")},
+    **{word: f"{word} = ${{1:value}}" for word in (*_WITH_CLAUSES,)},
     "ON": "ON ${1:condition} DO ${2:HALT}",
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
@@ -79,15 +81,19 @@ _WORD_SNIPPETS = {
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
-_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *_VOCABULARY.with_clauses))
+_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAUSES))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
-    "DIRECTLY": frozenset(("STRAIGHTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
-    "STRAIGHTLY": frozenset(("DIRECTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
-    **dict.fromkeys(("VIA", "APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY"))),
-    "SPEED": frozenset(("DURATION",)),
-    "DURATION": frozenset(("SPEED",)),
+    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
+    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
+    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
+    **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
+    "BLEND": frozenset(("DIRECTLY", "CIRCULARLY")),
+    "SPEED": frozenset(("DURATION", "VELOCITY")),
+    "DURATION": frozenset(("SPEED", "VELOCITY")),
+    "VELOCITY": frozenset(("SPEED", "DURATION")),
 }
 
 
@@ -100,6 +106,7 @@ class _OperandRule:
         arms: whether an arm may.
         devices: whether a device may.
         inputs: whether an input may.
+        targets: whether a joint target may.
         functions: which functions of the language may.
         values: which values of the language may.
         words: other words with a meaning at this position.
@@ -109,6 +116,7 @@ class _OperandRule:
     arms: bool = False
     devices: bool = False
     inputs: bool = False
+    targets: bool = False
     functions: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
@@ -121,7 +129,7 @@ _FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCAL
 _ANY_VALUE = _OperandRule(
     kinds=frozenset(VariableKind) - {VariableKind.EVENT},
     arms=True,
-    functions=tuple(FUNCTIONS),
+    functions=tuple(name for name in FUNCTIONS if name != JOINTS),
     values=tuple(sorted(VALUES)),
 )
 _NUMBER = _OperandRule(kinds=_SCALAR, functions=_NUMBERS, values=("PI", "TIME"))
@@ -171,6 +179,7 @@ _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
         for name, signature in FUNCTIONS.items()
         if signature.argument_types == ACCEPTED_TYPES[ExpressionType.SCALAR]
     },
+    JOINTS: attrs.evolve(_NUMBER, targets=True),
 }
 
 
@@ -217,11 +226,13 @@ def _operand_rule(expected: ExpectedTokens, tokens: Sequence[Token], scope: Scop
     call = enclosing_call(tokens)
     if call is not None and operand not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
         rule = _argument_rule(*call, scope.symbols)
-    elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
+    elif where in (f"after {word} =" for word in _WITH_CLAUSES if word not in ("APPROACH", "DEPARTURE")):
         rule = _NUMBER
     elif rule is None:
         # Behind a comma stands a number of a matrix.
         rule = _NUMBER if tokens[-1].key == "," else _rule_of_type(scope.type(expected.assignment_target))
+    if operand == "a pose" and where == "after TO" and call is None:
+        rule = attrs.evolve(rule, functions=(JOINTS,))
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
         return _STEP if VariableKind.FRAME in rule.kinds else _TRANS if VariableKind.TRANS in rule.kinds else rule
@@ -254,7 +265,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
         # The action of ON has ended before the position, or starts after it.
         if last in _CLAUSES and (last in written or _EXCLUDES.get(last, frozenset()) & written):
             continue
-        if last == "BLEND" and "VIA" not in written:
+        if last == "BLEND" and not {"VIA", "STRAIGHTLY"} & written:
             continue
         if last in allowed and (word != "RETRY" or expected.is_in_recovery):
             yield word
@@ -348,7 +359,10 @@ class _ItemFactory:
             yield self._item(name, Kind.Constant, "", arms[name])
 
     def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
-        """Give the devices of the cell."""
+        """Give the devices, inputs and joint targets of the cell."""
+        if operand.targets and self._analysis.cell is not None:
+            for name, target in sorted(self._analysis.cell.joint_targets.items()):
+                yield self._item(self._match_case(name), Kind.Property, "", f"joint target of {target.arm}")
         if operand.inputs and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.wiring.inputs):
                 yield self._item(self._match_case(name), Kind.Property, "", "input")

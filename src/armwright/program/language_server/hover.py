@@ -106,19 +106,26 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = signature(procedure.node)[0], [f"declared in line {line}"]
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
+        case NameKind.TARGET:
+            description = text, [_describe_target(analysis, key)]
         case NameKind.UNIT if key in UNITS:
             description = key, [f"a unit of {dimension(key)}"]
-        case NameKind.ERROR:
-            own = "a kind of error of the program, which RAISE raises and RECOVER may name"
-            description = text, [f"a kind of error: {KINDS[key]}" if key in KINDS else own]
-        case NameKind.WATCH:
-            description = text, ["the name of a WHEN, by which it is armed and disarmed"]
-        case NameKind.AXIS:
-            description = key, [f"the {key.lower()} axis"]
+        case NameKind.ERROR | NameKind.WATCH | NameKind.AXIS:
+            description = text, [_describe_plain(occurrence.kind, key)]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             description = word.syntax + value, [word.text]
     return description
+
+
+def _describe_plain(kind: NameKind, key: str) -> str:
+    """Return what a name is that stands for nothing in the cell or the program."""
+    if kind is NameKind.WATCH:
+        return "the name of a WHEN, by which it is armed and disarmed"
+    if kind is NameKind.AXIS:
+        return f"the {key.lower()} axis"
+    own = "a kind of error of the program, which RAISE raises and RECOVER may name"
+    return f"a kind of error: {KINDS[key]}" if key in KINDS else own
 
 
 def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
@@ -185,6 +192,18 @@ def _describe_device(analysis: Analysis, key: str) -> str:
     if cell is None or cell.devices is None:
         return "a device"
     return f"a device of {cell.name}" if key in cell.devices else f"{cell.name} has no such device"
+
+
+def _describe_target(analysis: Analysis, key: str) -> str:
+    cell = analysis.cell
+    if cell is None:
+        return "a joint target of the cell"
+    if key not in cell.joint_targets:
+        return f"{cell.name} has no such joint target"
+    target, units = cell.joint_targets[key], analysis.compiled.symbols.units
+    worth = [units.radians if it.revolute else units.metres for it in cell.arms[target.arm].arm.joints]
+    positions = ", ".join(f"{q / unit:.6g}" for q, unit in zip(target.q.tolist(), worth, strict=True))
+    return f"a joint target of {target.arm} in {cell.name}: JOINTS({positions})"
 
 
 def _parent_text(frame: str) -> str:

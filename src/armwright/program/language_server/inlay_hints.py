@@ -55,7 +55,7 @@ def _move_hints(analysis: Analysis, move: tree.Move) -> Iterator[lsp.InlayHint]:
         return
     source, flow = analysis.compiled.source, analysis.complete.flow
     text = stages_text(form_of(move, lambda node: " ".join(source.slice(node.span).split())))
-    tooltip = "the stages of this motion: PTP all joints at once, LINE straight, SPLINE and BLEND past poses"
+    tooltip = "the stages of this motion: PTP all joints at once, LINE straight, ARC round, SPLINE and BLEND past poses"
     arm = None if flow is None else flow.arms.get(move.span.start)
     if arm and not (isinstance(move.moved, tree.ArmName) and is_arm(move.moved.key)):
         text = f"{arm}: {text}"

@@ -18,7 +18,7 @@ class WordDoc(NamedTuple):
     text: str
 
 
-_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY] [VIA (poses)] [WITH ... = ...] [ON condition DO action]"
+_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY | CIRCULARLY] [VIA (poses)] [WITH ... = ...] [ON ... DO ...]"
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
 _COBEGIN = "COBEGIN [PRIORITY number :] BEGIN ... END ; BEGIN ... END COEND"
@@ -94,10 +94,14 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "MOVE": (_MOVE, "Moves an arm, or a frame that is affixed to an arm, to the pose of the goal."),
     "DIRECTLY": (_MOVE, "Moves all joints at once, without a straight path of the tool; this is the default."),
     "STRAIGHTLY": (_MOVE, "Moves the tool in a straight line."),
+    "CIRCULARLY": (
+        "MOVE frame TO goal CIRCULARLY, VIA (pose)",
+        "Moves the tool on an arc of a circle through the position of another pose.",
+    ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION = value",
-        "Specifies approach, departure, speed, rounding of corners or duration.",
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION = value",
+        "Specifies approach, departure, speed, rounding of corners, duration, or limits of the tool.",
     ),
     "APPROACH": ("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
     "DEPARTURE": ("WITH DEPARTURE = pose", "Leaves the start in a straight line to this pose."),
@@ -105,8 +109,20 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "WITH SPEED = number",
         f"From {LOWEST_SPEED:g} to {HIGHEST_SPEED:g}, the maximum of the arm; {NORMAL_SPEED:g} is the normal speed.",
     ),
-    "BLEND": ("WITH BLEND = distance", "Moves straight between via points and rounds corners within this distance."),
+    "BLEND": (
+        "WITH BLEND = distance",
+        "Rounds the corners at via points within this distance, or that from a MOVE STRAIGHTLY to the next one.",
+    ),
     "DURATION": ("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
+    "VELOCITY": (
+        "WITH VELOCITY = length",
+        "The tool point moves at this length per second at most, and at that speed where the arm can; not with SPEED.",
+    ),
+    "ROTATION": ("WITH ROTATION = angle", "The tool turns by this angle per second at most."),
+    "ACCELERATION": (
+        "WITH ACCELERATION = length",
+        "In each second the speed of the tool point changes by this length per second at most.",
+    ),
     # control
     "IF": (_IF, "Chooses between two statements."),
     "THEN": (_IF, "Precedes the statement that runs when the condition holds."),
@@ -195,6 +211,11 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "TRUE": ("TRUE", "The condition that holds."),
     "FALSE": ("FALSE", "The condition that does not hold."),
     "TIME": ("TIME", "The time on the clock of the cell since the program began, in seconds."),
+    # motion by joints
+    "JOINTS": (
+        "JOINTS (q1, q2, ...) | JOINTS (target)",
+        "The goal of a MOVE by the position of each joint, an angle or a length, or by a joint target of the cell.",
+    ),
     # sensors
     "INPUT": ("INPUT (name)", "A condition: whether a digital input of the cell is on."),
     "ANALOG": ("ANALOG (name)", "The number of an analogue input of the cell."),

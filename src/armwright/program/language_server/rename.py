@@ -15,6 +15,7 @@ _ARM = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
 _NOT_RENAMEABLE = {
     NameKind.ARM: "an arm, whose name is defined by the cell",
     NameKind.DEVICE: "a device, whose name is defined by the cell",
+    NameKind.TARGET: "a joint target, whose name is defined by the cell",
     NameKind.FUNCTION: "a function of the language",
     NameKind.UNIT: "a unit",
     NameKind.SENSOR: "a reserved word",
@@ -135,6 +136,6 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
-    fixed = {NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.VALUE}
-    fixed |= {NameKind.ERROR, NameKind.WATCH}
+    fixed = {NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.TARGET}
+    fixed |= {NameKind.VALUE, NameKind.ERROR, NameKind.WATCH}
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

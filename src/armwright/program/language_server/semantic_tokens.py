@@ -41,6 +41,7 @@ _NAME_STYLES = {
     NameKind.FUNCTION: ("function", _BIT["defaultLibrary"]),
     NameKind.ARM: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["arm"] | _BIT["frame"]),
     NameKind.DEVICE: ("property", 0),
+    NameKind.TARGET: ("property", 0),
     NameKind.UNIT: ("type", _BIT["defaultLibrary"]),
     NameKind.SENSOR: ("keyword", 0),
     NameKind.ERROR: ("enumMember", 0),

@@ -18,6 +18,7 @@ _PARAMETERS = {
     "INV": ("step",),
     "DIST": ("frame", "frame"),
     "TEXT": ("value",),
+    "JOINTS": ("q1", "q2", "q3"),
     **dict.fromkeys(WITH_INPUT, ("input",)),
     **dict.fromkeys(("OUTPUT", "SETTING"), ("device",)),
     "RPY": ("roll", "pitch", "yaw"),

@@ -9,7 +9,7 @@ import attrs
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_DEVICE
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, WITH_AXIS, WITH_DEVICE
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -34,6 +34,7 @@ class NameKind(enum.Enum):
     VALUE = "value of the language"
     ERROR = "kind of error"
     WATCH = "name of a WHEN"
+    TARGET = "joint target"
     UNKNOWN = "unknown name"
 
 
@@ -133,16 +134,24 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
                 name.writes = True
             elif previous in STATEMENT_OPENERS or not previous:
                 name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
-            elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key in WITH_AXIS:
-                name.kind, name.owner, name.type = NameKind.AXIS, None, None
-            elif previous == "(" and index > 1 and tokens[index - 2].key in WITH_DEVICE and next_key == ")":
-                name.kind, name.owner, name.type = NameKind.DEVICE, None, None
+            elif previous == "(" and index > 1:
+                _classify_argument(name, tokens[index - 2].key, next_key)
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_recover = key == "RECOVER"
             in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
         previous = key
     return tuple(result)
+
+
+def _classify_argument(name: Occurrence, function: str, next_key: str) -> None:
+    """Change what the first argument of a function is, where that takes the name of something else than a variable."""
+    if name.key in AXES and function in WITH_AXIS:
+        name.kind, name.owner, name.type = NameKind.AXIS, None, None
+    elif function in WITH_DEVICE and next_key == ")":
+        name.kind, name.owner, name.type = NameKind.DEVICE, None, None
+    elif function == JOINTS and next_key == ")" and name.kind is NameKind.UNKNOWN:
+        name.kind = NameKind.TARGET
 
 
 def _classify_name(token: Token, key: str, scope: Scope, previous: str, next_key: str, *, in_units: bool) -> Occurrence:

@@ -9,6 +9,7 @@ from armwright.program.language.units import Dimension
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType, quote_expression, variable_keys
 from armwright.program.semantics.quantities import check_unit
 from armwright.program.semantics.scopes import NameResolver
+from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import tree
 
 AXES = ("X", "Y", "Z")
@@ -19,6 +20,8 @@ WITH_INPUT = ("INPUT", "ANALOG")
 WITH_DEVICE = (*WITH_INPUT, "OUTPUT", "SETTING")
 # Functions whose argument is a name that is no variable.
 WITH_NAME = (*WITH_AXIS, *WITH_DEVICE)
+# The goal of a MOVE by the positions of the joints, or by the name of a joint target of the cell.
+JOINTS = "JOINTS"
 # Procedures of programs may not have the names of these: all other functions came later than such programs.
 FIRST_FUNCTIONS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV", "DIST", "FORCE")
 
@@ -56,6 +59,7 @@ FUNCTIONS: Mapping[str, Signature] = {
     "XYZ": Signature("three lengths", 3, _SCALARS, ExpressionType.TRANS, "length"),
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), Signature("one angle", 1, _SCALARS, ExpressionType.TRANS, "angle")),
     "TEXT": Signature("a value or more", 1, _PRINTABLE, ExpressionType.TEXT, more=True),
+    JOINTS: Signature("a position for each joint", 1, _SCALARS, ExpressionType.FRAME, more=True),
     "INV": Signature("one TRANS or FRAME", 1, _INVERTIBLE, ExpressionType.TRANS),
     "DIST": Signature("two FRAMEs", 2, _FRAMES, ExpressionType.SCALAR),
     **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),
@@ -83,6 +87,10 @@ def result_type(
         argument_types: types of the arguments; not used where the argument is an axis.
     """
     key, signature = node.name.key, FUNCTIONS[node.name.key]
+    if key == JOINTS:
+        text, advice = "JOINTS is no value: it says where a MOVE ends", "write `MOVE ARM_1 TO JOINTS(...)`"
+        names.report("E241", text, node.span, "not the goal of a MOVE", advice=advice)
+        return None
     required = f"{key} takes {signature.parameters}"
     given = len(node.arguments)
     if given < signature.count or (given > signature.count and not signature.more):
@@ -103,6 +111,19 @@ def result_type(
         return signature.result
     inverted = argument_types[0]
     return _INVERSES.get(inverted, inverted) if inverted in signature.argument_types else None
+
+
+def is_joints(scope: Scope, node: tree.Node) -> bool:
+    """Whether an expression is JOINTS with its arguments, and not a call of a procedure of this name."""
+    return isinstance(node, tree.Function) and node.name.key == JOINTS and JOINTS not in scope.symbols.procedures
+
+
+def joint_target(scope: Scope, node: tree.Function) -> tree.Name | None:
+    """Return the one argument of JOINTS where that is the name of a joint target, as nothing else is called so."""
+    only = node.arguments[0] if len(node.arguments) == 1 else None
+    if not isinstance(only, tree.Name) or scope.is_value(only.key):
+        return None
+    return None if only.key in scope.table(only.key).types else only
 
 
 def _check_device(names: NameResolver, function: str, node: tree.Expression) -> None:

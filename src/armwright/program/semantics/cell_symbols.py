@@ -25,6 +25,8 @@ class KnownCell:
         inputs: that can be read; None when nothing is known of them.
         visions: frames that the camera has an answer for; None when nothing is known of the camera.
         reach: of the arm that reaches farthest [m]; None when that is not known.
+        joints: of each arm whose joints are known a letter for each, R for one that turns and P for one that slides.
+        targets: the joint targets, each with its arm; None when nothing is known of them.
     """
 
     arms: frozenset[str]
@@ -34,6 +36,8 @@ class KnownCell:
     inputs: frozenset[str] | None = None
     visions: frozenset[str] | None = None
     reach: float | None = None
+    joints: Mapping[str, str] = attrs.field(factory=dict)
+    targets: Mapping[str, str] | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -80,6 +84,8 @@ def known_cell(cell: Cell) -> KnownCell:
         inputs=frozenset(cell.wiring.inputs),
         visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
+        joints={name: "".join("RP"[not it.revolute] for it in arm.arm.joints) for name, arm in cell.arms.items()},
+        targets={name: target.arm for name, target in cell.joint_targets.items()},
     )
 
 

@@ -1,9 +1,11 @@
 """MOVE: the types of what it moves, its goal and its clauses, and which clauses go together."""
 
 from armwright.program.language.diagnostic import labels
+from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
+from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.context import Checks, Context
-from armwright.program.semantics.expression_types import ExpressionType, expression_text
+from armwright.program.semantics.expression_types import ExpressionType, expression_text, quote_expression
 from armwright.program.semantics.quantities import check_range, check_unit
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.type_check import require_condition, require_quantity, require_type
@@ -12,6 +14,7 @@ from armwright.program.syntax import tree
 # What a clause gives, and what stands against it where DIRECTLY is given.
 _CONFLICTS_WITH_DIRECTLY: dict[type, tuple[str, str]] = {
     tree.Straightly: ("a straight line asked for here", "requests one motion of the joints to the goal"),
+    tree.Circularly: ("an arc asked for here", "requests one motion of the joints to the goal"),
     tree.Via: ("via points given here", "allows no via points"),
     tree.Approach: ("approach point given here", "allows no approach point"),
     tree.Departure: ("departure point given here", "allows no departure point"),
@@ -24,7 +27,10 @@ def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
     require_type(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
-    _check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
+    if isinstance(node.goal, tree.Function) and is_joints(names.scope, node.goal):
+        _check_joints(names, node, node.goal)
+    else:
+        _check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
     _check_combination(names, node.clauses)
     for clause in node.clauses:
         match clause:
@@ -37,11 +43,11 @@ def move(context: Context, node: tree.Move) -> None:
             case tree.Speed(value=value):
                 _check_speed(names, value)
             case tree.Blend(value=value) | tree.Duration(value=value):
-                required: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
-                word = tree.clause_word(type(clause))
-                if require_quantity(names, value, required, f"{word} needs a {required}"):
-                    check_range(names, value, f"a {word}", zero=False)
-            case tree.On(condition=wanted, action=action):
+                _check_quantity(names, clause, value)
+            case tree.Velocity(value=value) | tree.Rotation(value=value) | tree.Acceleration(value=value):
+                _check_quantity(names, clause, value)
+            case tree.On(condition=wanted, action=action, head=head):
+                _check_guard_place(names, node, head)
                 require_condition(names, wanted, "ON")
                 context.check_with(action, recovering=False)
 
@@ -61,6 +67,41 @@ def _check_pose(
     require_type(names, node, ExpressionType.FRAME, code, what, advice=advice)
 
 
+# What JOINTS as a goal has nothing to do with: only the joints know where they go.
+_CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Approach)
+
+
+def _check_guard_place(names: NameResolver, node: tree.Move, head: Span) -> None:
+    """Report a guard of a MOVE that goes over into the next one."""
+    kinds = {type(clause): clause for clause in node.clauses}
+    if tree.Blend in kinds and tree.Straightly in kinds and tree.Via not in kinds:
+        text, here = (
+            "a MOVE that goes over into the next one has no guard",
+            labels(kinds[tree.Blend].span, "BLEND here"),
+        )
+        advice = "leave BLEND out, so that the MOVE ends at its goal"
+        names.report("E226", text, head, "until when?", secondary=here, advice=advice)
+
+
+def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> None:
+    """Check a goal that is given by joint positions: what goes to it, and how."""
+    if joint_target(names.scope, goal) is None:
+        if not goal.arguments:
+            names.report("E242", "JOINTS takes a position for each joint", goal.span, "no positions here")
+        for argument in goal.arguments:
+            require_type(names, argument, ExpressionType.SCALAR, "E216", "a joint position is a number")
+    if not isinstance(node.moved, tree.ArmName | tree.Poison):
+        text = f"JOINTS is a goal for an arm, not for {quote_expression(node.moved)}"
+        advice = "move the arm that carries it"
+        names.report("E241", text, node.moved.span, "this is not an arm", advice=advice)
+    for clause in node.clauses:
+        if isinstance(clause, _CONFLICTS_WITH_JOINTS):
+            word = tree.clause_word(type(clause))
+            text, here = f"{word} cannot be combined with JOINTS", labels(goal.span, "joint positions given here")
+            advice = "let one MOVE go to a frame, and the next to JOINTS"
+            names.report("E241", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
+
+
 def _check_speed(names: NameResolver, node: tree.Expression) -> None:
     is_number = require_type(names, node, ExpressionType.SCALAR, "E216", "SPEED needs a number or a SCALAR")
     if not is_number or not isinstance(node, tree.Number) or not check_unit(names, node, None, "a speed has no unit"):
@@ -69,6 +110,23 @@ def _check_speed(names: NameResolver, node: tree.Expression) -> None:
     if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
         text = f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
         names.report("E207", text, node.span, "out of range", note=SPEED_NOTE)
+
+
+# Clauses that are quantities: what each measures, with the unit of the program, and what it needs in words.
+_QUANTITIES: dict[type, tuple[Dimension, str]] = {
+    tree.Blend: ("length", "a length"),
+    tree.Duration: ("time", "a time"),
+    tree.Velocity: ("length", "a length per second"),
+    tree.Rotation: ("angle", "an angle per second"),
+    tree.Acceleration: ("length", "a length per second squared"),
+}
+
+
+def _check_quantity(names: NameResolver, clause: tree.Clause, value: tree.Expression) -> None:
+    """Check a clause that is a quantity: a number above 0, whose unit fits where it has one."""
+    (required, needs), word = _QUANTITIES[type(clause)], tree.clause_word(type(clause))
+    if require_quantity(names, value, required, f"{word} needs {needs}"):
+        check_range(names, value, f"{'an' if word == 'ACCELERATION' else 'a'} {word}", zero=False)
 
 
 def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) -> None:
@@ -81,9 +139,29 @@ def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) ->
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
             text = f"{tree.clause_word(type(clause))} is given twice in one MOVE"
             names.report("E213", text, clause.span, "second", secondary=labels(earlier.span, "first"))
+    if (circular := first.get(tree.Circularly)) is not None:
+        _check_arc(names, circular, first)
     if len(first) > 1 or tree.Blend in first:
         _check_paths(names, first)
         _check_durations(names, first)
+
+
+def _check_arc(names: NameResolver, circular: tree.Clause, first: dict[type, tree.Clause]) -> None:
+    """Check that an arc has one frame to pass, and no other way to go."""
+    via = first.get(tree.Via)
+    if not isinstance(via, tree.Via):
+        advice = "write `CIRCULARLY, VIA (f)` with a frame on the arc"
+        names.report("E243", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
+    elif len(via.points) > 1:
+        text, here = f"an arc passes one frame, not {len(via.points)}", labels(circular.span, "an arc asked for here")
+        advice = "write one `MOVE ... CIRCULARLY` for each arc"
+        names.report("E243", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
+    for kind in (tree.Straightly, tree.Approach, tree.Departure, tree.Blend):
+        if clause := first.get(kind):
+            text = f"CIRCULARLY cannot be combined with {tree.clause_word(kind)}"
+            here = labels(circular.span, "requests one arc")
+            advice = "write a MOVE for the arc, and one for each other leg"
+            names.report("E243", text, clause.span, "another way", secondary=here, advice=advice)
 
 
 def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
@@ -94,21 +172,38 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
         if direct and label:
             here, advice = labels(direct.span, against), "remove one of the two"
             names.report("E208", f"DIRECTLY {combined}", clause.span, label, secondary=here, advice=advice)
-        elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
+        elif straight and tree.Circularly not in first and kind in (tree.Via, tree.Approach, tree.Departure):
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
             names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)
-    if blend and not direct and tree.Via not in first:
+    if blend and not direct and tree.Via not in first and tree.Circularly not in first:
+        _check_going_over(names, blend, straight, first)
+
+
+def _check_going_over(
+    names: NameResolver, blend: tree.Clause, straight: tree.Clause | None, first: dict[type, tree.Clause]
+) -> None:
+    """Check a BLEND without VIA: a MOVE goes over into the next one only on a straight line."""
+    if straight is None:
         text = "BLEND rounds the corners at via points, but there is no VIA"
-        names.report("E226", text, blend.span, "no corners to round", advice="add `VIA ( ... )`, or leave BLEND out")
+        advice = "add `VIA ( ... )`, or STRAIGHTLY to go over into the next MOVE, or leave BLEND out"
+        names.report("E226", text, blend.span, "no corners to round", advice=advice)
+    elif (duration := first.get(tree.Duration)) is not None:
+        text = "a MOVE that goes over into the next one has no DURATION of its own"
+        here = labels(blend.span, "it goes over into the next one")
+        advice = "write SPEED or VELOCITY"
+        names.report("E226", text, duration.span, "of which part?", secondary=here, advice=advice)
 
 
 def _check_durations(names: NameResolver, first: dict[type, tree.Clause]) -> None:
-    speed, duration = first.get(tree.Speed), first.get(tree.Duration)
-    if speed and duration:
-        earlier, later = sorted((speed, duration), key=lambda clause: clause.span.start)
+    for kinds in ((tree.Speed, tree.Duration), (tree.Speed, tree.Velocity), (tree.Velocity, tree.Duration)):
+        given = [clause for clause in map(first.get, kinds) if clause is not None]
+        if len(given) < len(kinds):
+            continue
+        earlier, later = sorted(given, key=lambda clause: clause.span.start)
         first_word, word = tree.clause_word(type(earlier)), tree.clause_word(type(later))
-        text, here = "SPEED cannot be combined with DURATION", labels(earlier.span, f"{first_word} given here")
+        text = f"{tree.clause_word(kinds[0])} cannot be combined with {tree.clause_word(kinds[1])}"
+        here = labels(earlier.span, f"{first_word} given here")
         note, advice = "each of them determines the duration of the motion", "remove one of the two"
         names.report("E230", text, later.span, f"{word} given here", secondary=here, note=note, advice=advice)
 

@@ -229,6 +229,8 @@ def _function(names: NameResolver, node: tree.Function) -> ExpressionType | None
     if key in FUNCTIONS and key not in names.symbols.procedures:
         # An axis has a name but is no variable.
         is_axis = [key in WITH_NAME and isinstance(argument, tree.Name) for argument in arguments]
+        if builtins.is_joints(names.scope, node) and builtins.joint_target(names.scope, node) is not None:
+            is_axis = [True]
         types = [None if axis else infer_type(names, node) for axis, node in zip(is_axis, arguments, strict=True)]
         return builtins.result_type(names, node, types)
     procedure = names.resolve_call(key)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, did_you_mean
 from armwright.program.language.source import Span
+from armwright.program.language.words import PLAIN_CLAUSES_IN_CONTEXT, WITH_CLAUSES_IN_CONTEXT, Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import head_expression
 from armwright.program.syntax.expressions import expression, mobile, parenthesised_list
@@ -18,8 +19,10 @@ from armwright.program.syntax.token_stream import TokenStream, either
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
 _VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
-    tree.clause_word(kind): kind for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration)
+    tree.clause_word(kind): kind
+    for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS)
 }
+_CLAUSES_IN_CONTEXT = (*PLAIN_CLAUSES_IN_CONTEXT, *WITH_CLAUSES_IN_CONTEXT)
 
 
 # move = "MOVE" mobile "TO" expr { [","] clause } ;
@@ -33,8 +36,9 @@ def move(tokens: TokenStream) -> tree.Move:
     while tokens.current.key != ";":
         comma = tokens.accept(",")
         if tokens.is_at_end:
-            words = (f"WITH {word}" for word in tokens.vocabulary.with_clauses)
-            tokens.note_expected_words(*tokens.vocabulary.plain_clauses, *words, present_clauses=_clause_words(clauses))
+            words = (f"WITH {word}" for word in _with_words(tokens))
+            plain = _plain_words(tokens)
+            tokens.note_expected_words(*plain, *words, present_clauses=_clause_words(clauses))
         if not _starts_clause(tokens):
             if comma:
                 tokens.fail("expected a clause after `,`")
@@ -42,6 +46,18 @@ def move(tokens: TokenStream) -> tree.Move:
         if (clause := _clause(tokens, clauses)) is not None:
             clauses.append(clause)
     return tokens.node(tree.Move, start, moved, goal, tuple(clauses))
+
+
+def _plain_words(tokens: TokenStream) -> tuple[str, ...]:
+    """Return the clauses that stand without WITH: also those that are words only here, which RLO-83 lacks."""
+    words = tokens.vocabulary.plain_clauses
+    return (*words, *PLAIN_CLAUSES_IN_CONTEXT) if tokens.standard is Standard.RLO_2 else words
+
+
+def _with_words(tokens: TokenStream) -> tuple[str, ...]:
+    """Return the clauses that stand behind WITH, in the same way."""
+    words = tokens.vocabulary.with_clauses
+    return (*words, *WITH_CLAUSES_IN_CONTEXT) if tokens.standard is Standard.RLO_2 else words
 
 
 def _clause_words(clauses: list[tree.Clause]) -> frozenset[str]:
@@ -53,36 +69,43 @@ def _starts_clause(tokens: TokenStream) -> bool:
     """Whether a clause stands here, rightly or wrongly spelt, and not the next statement."""
     token, after = tokens.current, tokens.peek()
     words = tokens.vocabulary
+    if tokens.matches_word(*_CLAUSES_IN_CONTEXT) and (
+        tokens.previous.key == "," or after.key not in ("=", ":=", "(", "[")
+    ):
+        return True
     if token.kind is TokenKind.KEYWORD:
         return token.key in words.clauses
     if token.kind is not TokenKind.NAME:
         return False
     if after.key in ("=", ":=", "(", "["):
         # WITH may be missing in front of a misspelt word: `, SPED = 5`.
-        return tokens.previous.key == "," and closest(token.text, words.with_clauses) is not None
+        return tokens.previous.key == "," and closest(token.text, _with_words(tokens)) is not None
     if token.key in tokens.declared and tokens.previous.key != ",":
         return False
-    if closest(token.text, words.clauses):
-        return True
-    return tokens.is_on_same_line() and not closest(token.text, (*words.statements, *words.block_ends))
+    is_near = closest(token.text, (*_plain_words(tokens), *_with_words(tokens), *words.clauses)) is not None
+    others = (*words.statements, *words.block_ends)
+    return is_near or (tokens.is_on_same_line() and not closest(token.text, others))
 
 
-# clause = "DIRECTLY" | "STRAIGHTLY"
+# clause = "DIRECTLY" | "STRAIGHTLY" | "CIRCULARLY"
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
+#        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" ) "=" expr
 #        | "ON" expr "DO" action ;
 def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""
-    if tokens.current.kind is TokenKind.NAME and not _replace_misspelt_clause(tokens):
+    if tokens.matches_word(*_CLAUSES_IN_CONTEXT):
+        tokens.current.kind = TokenKind.KEYWORD
+    elif tokens.current.kind is TokenKind.NAME and not _replace_misspelt_clause(tokens):
         return None
     token, key = tokens.current, tokens.current.key
     if key == "ON":
         return _guard(tokens)
     tokens.take()
     if key == "WITH":
-        tokens.note_expected_words(*tokens.vocabulary.with_clauses, present_clauses=_clause_words(others))
+        tokens.note_expected_words(*_with_words(tokens), present_clauses=_clause_words(others))
         return _with_clause(tokens, token)
-    if key in tokens.vocabulary.with_clauses:
+    if key in _with_words(tokens):
         if not token.damaged:
             text, advice, fix = f"{key} needs WITH before it", f"write `WITH {key} = ...`", Fix(token.gap, "WITH ")
             tokens.report("E116", text, token.span, "expected WITH before this", advice=advice, fixes=(fix,))
@@ -93,8 +116,9 @@ def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | Non
 def _replace_misspelt_clause(tokens: TokenStream) -> bool:
     """Put the clause word that was meant in place of a misspelt one; pass over a clause for which there is none."""
     token = tokens.current
-    near = closest(token.text, tokens.vocabulary.clauses)
-    known = f"clauses are {', '.join((*tokens.standard_vocabulary.plain_clauses, 'WITH ...'))}"
+    near = closest(token.text, (*_plain_words(tokens), *_with_words(tokens), *tokens.vocabulary.clauses))
+    in_context = _plain_words(tokens)[len(tokens.vocabulary.plain_clauses) :]
+    known = f"clauses are {', '.join((*tokens.standard_vocabulary.plain_clauses, *in_context, 'WITH ...'))}"
     advice = did_you_mean(near) or known
     tokens.report("E108", f"unknown clause `{token.text}`", token.span, "not a clause of MOVE", advice=advice)
     if near:
@@ -109,6 +133,8 @@ def _plain_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause | 
         return tree.Directly(start.span)
     if key == "STRAIGHTLY":
         return tree.Straightly(start.span)
+    if key == "CIRCULARLY":
+        return tree.Circularly(start.span)
     if key == "VIA":
         return tokens.node(tree.Via, start, parenthesised_list(tokens, expression, "a pose", "after VIA"))
     return None
@@ -117,16 +143,20 @@ def _plain_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause | 
 def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
     """Read what follows WITH."""
     token = tokens.current
-    with_words, expected = tokens.vocabulary.with_clauses, f"expected {either(tokens.standard_vocabulary.with_clauses)}"
-    if tokens.matches(*tokens.vocabulary.plain_clauses):
+    in_context = _with_words(tokens)[len(tokens.vocabulary.with_clauses) :]
+    expected = f"expected {either((*tokens.standard_vocabulary.with_clauses, *in_context))}"
+    if tokens.matches(*tokens.vocabulary.plain_clauses) or tokens.matches_word(*PLAIN_CLAUSES_IN_CONTEXT):
+        token.kind = TokenKind.KEYWORD
         text, advice = f"{token.key} is written without WITH", f"write `{token.key}` alone"
         fix = Fix(Span(start.start, token.start), "")
         tokens.report("E116", text, start.span, "WITH does not belong here", advice=advice, fixes=(fix,))
         tokens.take()
         return _plain_clause(tokens, token, token.key)
-    key: str | None = token.key if tokens.matches(*with_words) else None
+    if tokens.matches_word(*WITH_CLAUSES_IN_CONTEXT):
+        token.kind = TokenKind.KEYWORD
+    key: str | None = token.key if tokens.matches(*_with_words(tokens)) else None
     if key is None and token.kind is TokenKind.NAME:
-        key = closest(token.text, with_words)
+        key = closest(token.text, _with_words(tokens))
         tokens.report("E108", f"unknown clause `WITH {token.text}`", token.span, expected, advice=did_you_mean(key))
         if key is None:
             _skip_clause(tokens)

@@ -128,6 +128,11 @@ class Straightly(Node):
 
 
 @attrs.frozen
+class Circularly(Node):
+    """One arc of a circle, through the one frame of VIA."""
+
+
+@attrs.frozen
 class Via(Node):
     """``VIA (points)``."""
 
@@ -170,6 +175,27 @@ class Duration(Node):
 
 
 @attrs.frozen
+class Velocity(Node):
+    """``WITH VELOCITY = length per second``: the largest speed of the tool point."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Rotation(Node):
+    """``WITH ROTATION = angle per second``: the largest angular speed of the tool."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Acceleration(Node):
+    """``WITH ACCELERATION = length per second squared``: how fast the speed of the tool point may change."""
+
+    value: Expression
+
+
+@attrs.frozen
 class On(Node):
     """``ON condition DO action``; ``head`` reaches from ON to the end of the condition."""
 
@@ -178,7 +204,23 @@ class On(Node):
     action: "Statement"
 
 
-Clause: TypeAlias = Directly | Straightly | Via | Approach | Departure | Speed | Blend | Duration | On
+Clause: TypeAlias = (
+    Directly
+    | Straightly
+    | Circularly
+    | Via
+    | Approach
+    | Departure
+    | Speed
+    | Blend
+    | Duration
+    | Velocity
+    | Rotation
+    | Acceleration
+    | On
+)
+# Clauses that limit the tool.
+TOOL_LIMITS = (Velocity, Rotation, Acceleration)
 
 
 def clause_word(kind: type) -> str:

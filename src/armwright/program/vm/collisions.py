@@ -66,6 +66,7 @@ def checked_stages(
         partial(_path_past, machine, request.speed),
         partial(_check, machine),
         fixed_duration=request.duration is not None,
+        tool=request.tool,
     )
     move, check = done.move, done.check
     if check.collision is not None:

@@ -171,6 +171,10 @@ def _stop_motion(machine: Machine, process: Process, span: Span, inside: int = 0
     for activation in process.stack[inside:]:
         if activation.interrupted is not None:
             abandon_interrupted(machine, process, activation.interrupted)
+    if process.ahead is not None:
+        # They have not begun, though the program has taken the arm for being at their goal.
+        arm, process.ahead = process.ahead.arm, None
+        machine.update_hand_pose(arm, span)
     motion = process.motion
     if motion is None or any(one.kind == "watch" for one in process.stack[motion.stack_depth : inside]):
         return rest_tick(machine, process.last_arm)

@@ -23,8 +23,9 @@ from armwright.program.vm.collisions import threatened_error
 from armwright.program.vm.contact import stop_too_deep
 from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
 from armwright.program.vm.machine import Handler, Limits, Machine, RunError
-from armwright.program.vm.move import advance_motion
-from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_warning
+from armwright.program.vm.move import advance_motion, begin_moves_ahead
+from armwright.program.vm.move_diagnostics import clearance_warning, obstacle_warning, speed_warning
+from armwright.program.vm.moves_ahead import is_done_at_once
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
@@ -193,6 +194,9 @@ def _advance(machine: Machine, process: Process) -> None:
         advance_motion(machine, process)
         return
     step = machine.code.instructions[process.pc]
+    if process.ahead is not None and not is_done_at_once(process, step):
+        begin_moves_ahead(machine, process, process.ahead)
+        return
     machine.count_step(process, step.span)
     process.pc += 1
     HANDLERS[step.op](machine, process, step)
@@ -232,7 +236,8 @@ def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic,
     """Return the warnings about stages that were run in a cell.
 
     For every straight line that was gone round, every VIA with stops because corners cannot be rounded, every stage
-    that comes too near to other bodies, and every joint or drive asked for too much effort.
+    that comes too near to other bodies, every tool that is slower than asked for because of limits, and every joint or
+    drive asked for too much effort.
     """
     diagnostics = []
     for stage in stages:
@@ -241,6 +246,8 @@ def motion_warnings(stages: Iterable[RunStage], cell: Cell) -> tuple[Diagnostic,
         if (warning := clearance_warning(stage, cell.clearance)) is not None:
             diagnostics.append(warning)
         arm = cell.arms[stage.arm].arm
+        if (warning := speed_warning(stage, arm)) is not None:
+            diagnostics.append(warning)
         excessive = np.flatnonzero(stage.peak_effort / arm.all_limits.effort > 1)
         diagnostics += [_effort_warning(stage, arm, number) for number in excessive.tolist()]
     return tuple(diagnostics)

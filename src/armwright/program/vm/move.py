@@ -9,11 +9,20 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
-from armwright.errors import IncapableArmError
+from armwright.errors import IncapableArmError, counted
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.arc import FlatArcError
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
-from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text
+from armwright.program.bytecode.instructions import (
+    MOVE_PARTS,
+    Instruction,
+    MotionKind,
+    Op,
+    StagePlan,
+    stages_of,
+    stages_text,
+)
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
@@ -32,7 +41,8 @@ from armwright.program.vm.contact import (
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
-from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, Process
+from armwright.program.vm.moves_ahead import fits, goes_over, merged
+from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
 from armwright.spatial.poses import inverse
@@ -58,19 +68,63 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim_arm(process, arm, step.span, moved)
     _require_idle_arm(machine, process, arm, step.span)
+    if process.ahead is not None or goes_over(request):
+        ahead = process.ahead or MovesAhead(arm=arm, moved=moved, implied_affix=implied)
+        _put_ahead(machine, process, ahead, request, moved)
+        return
+    _begin_move(machine, process, request, arm, moved, implied=implied)
+
+
+def _put_ahead(machine: Machine, process: Process, ahead: MovesAhead, request: MoveRequest, moved: str) -> None:
+    """Let a MOVE wait for the next one, which it goes over into; begin them all where this is the last of them."""
+    if ahead.requests and not fits(ahead, request, moved):
+        # When they are at rest the same instruction is looked at again.
+        process.pc -= 1
+        begin_moves_ahead(machine, process, ahead)
+        return
+    arm, goal = ahead.arm, request.goals[request.form.goal]
+    X_BW, X_MH = inverse(machine.base_pose(arm)), inverse(machine.state.tree.relation(moved, arm))
+    X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
+    # What its operand names may be another thing when the MOVE begins.
+    goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    request = request._replace(goals={request.form.goal: goal})
+    ahead = attrs.evolve(ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH))
+    if goes_over(request):
+        process.ahead = ahead
+        # What is worked out before the arm is there takes it for being there.
+        reached = machine.state.tree.set_pose(arm, machine.base_pose(arm) @ X_BH)
+        machine.replace_tree(reached, arm, request.span)
+    else:
+        begin_moves_ahead(machine, process, ahead)
+
+
+def begin_moves_ahead(machine: Machine, process: Process, ahead: MovesAhead) -> None:
+    """Begin the MOVEs that have waited for the next one, as one path that stops at its end."""
+    process.ahead = None
+    machine.update_hand_pose(ahead.arm, ahead.requests[0].span)
+    request = merged(ahead.requests, ahead.poses)
+    _begin_move(machine, process, request, ahead.arm, ahead.moved, implied=ahead.implied_affix)
+
+
+def _begin_move(
+    machine: Machine, process: Process, request: MoveRequest, arm: str, moved: str, *, implied: bool
+) -> None:
+    """Plan a MOVE and begin its first stage."""
     machine.state.idle_steps += _STEPS_PER_MOVE
     planned = _plan_stages(machine, process, request, arm, moved)
     stages = checked_stages(machine, process, request, arm, planned)
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
     speed_text = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
+    if request.tool is not None and math.isfinite(request.tool.speed):
+        speed_text = f"@{request.tool.speed * 1e3:g} mm/s"
     process.motion = Motion(
         arm=arm,
         moved=moved,
         X_HM=machine.state.tree.relation(moved, arm),
-        span=step.span,
+        span=request.span,
         text=f"{subject} MOVE: {stages_text(request.form).replace(' / ', '; ')} {speed_text}",
-        goal=machine.variable_name(process, request.begin.operands[1]) or request.form.goal,
+        goal=_goal_name(machine, process, request),
         implied_affix=implied,
         stages=stages,
         paths=tuple(stage.path for stage in stages if stage.path is not None),
@@ -156,6 +210,15 @@ def _finish_enclosing_move(machine: Machine, process: Process, motion: Motion, s
 # ---- planning ------------------------------------------------------------------------------------------------------
 
 
+def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
+    """Return the frame that a MOVE goes to, or the expression of it."""
+    if request.joints is not None:
+        return request.form.goal
+    if request.fixed:
+        return str(request.goals[request.form.goal].operand) or request.form.goal
+    return machine.variable_name(process, request.begin.operands[1]) or request.form.goal
+
+
 def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
     """Return the arm that carries what is moved, and whether it hangs there only from now on."""
     if is_arm(moved):
@@ -202,26 +265,68 @@ def _plan_stages(
     plans = stages_of(request.form)
     X_BW = inverse(machine.base_pose(arm))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
+    joints = _goal_joints(machine, process, request, arm)
+
+    def pose(label: str) -> Array:
+        if label in request.fixed:
+            return request.fixed[label]
+        if joints is not None and label == request.form.goal:
+            return forward(cell_arm.arm, joints)
+        return X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH
+
     goals = [
         StageGoal(
             kind=legs.kind.value,
-            poses=np.stack([X_BW @ _goal_pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
+            poses=np.stack([pose(label) for label in legs.frames]),
+            joints=joints if request.form.goal in legs.frames else None,
             blend=request.blend,
             corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
         for legs in plans
     ]
-    manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
+    manner = Manner(
+        speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
+    )
     try:
         stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
+    except FlatArcError as error:
+        text = f"no arc leads through `{request.form.via[0]}` to `{request.form.goal}`: they are on one line"
+        helps = ["choose a frame to pass that is farther off the line, or write STRAIGHTLY instead"]
+        raise machine.error(process, "E407", text, request.span, "no arc", notes=[str(error)], helps=helps) from None
     except IncapableArmError as error:
         text = f"{arm} cannot make this MOVE at any speed: {error}"
         raise machine.error(process, "E406", text, request.span, "asked for here") from None
     if request.duration is not None:
         stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
+
+
+def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: str) -> Array | None:
+    """Return the joint positions (n,) that a MOVE goes to; None where it goes to a frame.
+
+    Raises:
+        RunError: they do not fit the arm.
+    """
+    asked, span = request.joints, request.goals[request.form.goal].span
+    model, targets = machine.cell.arms[arm].arm, machine.cell.joint_targets
+    if asked is None:
+        return None
+    if isinstance(asked, str):
+        if asked not in targets:
+            known = [f"joint targets of the cell: {', '.join(sorted(targets)) or 'none'}"]
+            text = f"the cell has no joint target `{machine.spelling(asked)}`"
+            raise machine.error(process, "E242", text, span, "no such joint target", notes=known)
+        if targets[asked].arm != arm:
+            text = f"joint target `{machine.spelling(asked)}` is one of {targets[asked].arm}, not of {arm}"
+            raise machine.error(process, "E242", text, span, "of another arm")
+        return targets[asked].q
+    if len(asked) != model.n:
+        text = f"{arm} has {counted(model.n, 'joint')}, but JOINTS is given {len(asked)}"
+        raise machine.error(process, "E242", text, span, f"expected {model.n} positions")
+    units = machine.code.units
+    return np.asarray(np.where(model.revolute, units.radians, units.metres) * np.array(asked))
 
 
 def _goal_pose(machine: Machine, process: Process, goal: Goal) -> Array:
@@ -252,7 +357,9 @@ def _retime_stage(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> Pla
     if certificate is not None and slow.duration:
         certificate = certificate.retimed(slow.duration / stage.trajectory.duration)
         certificate = attrs.evolve(certificate, factor=1.0, because=None) if longer else certificate
-    return attrs.evolve(stage, trajectory=slow, slowed="" if longer else stage.slowed, certificate=certificate)
+    unmet = None if longer else stage.unmet
+    slowed = "" if longer else stage.slowed
+    return attrs.evolve(stage, trajectory=slow, slowed=slowed, certificate=certificate, unmet=unmet)
 
 
 def _fail_move(
@@ -260,7 +367,8 @@ def _fail_move(
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = request.goals[label], stage.kind.value
-    frame = machine.variable_name(process, goal.operand)
+    is_frame = not request.fixed and (request.joints is None or label != request.form.goal)
+    frame = machine.variable_name(process, goal.operand) if is_frame else None
     secondary = machine.origin_labels(frame, f"`{label}` got its pose here") if frame else []
     raise machine.error(
         process,
@@ -270,7 +378,10 @@ def _fail_move(
         "cannot be reached",
         secondary=secondary,
         notes=(obstacle_location(obstacle, kind, stage.frames, arm),),
-        helps=(*_unit_advice(machine, process, goal, arm), *detour_advice(obstacle, kind, machine.cell.around)),
+        helps=(
+            *(_unit_advice(machine, process, goal, arm) if is_frame else ()),
+            *detour_advice(obstacle, kind, machine.cell.around),
+        ),
     )
 
 
@@ -368,7 +479,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.MVHLT: halt_motion,
     # The parts of a MOVE are gathered by its end.
     **dict.fromkeys(
-        (Op.MVBEG, Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
+        (Op.MVBEG, *sorted(MOVE_PARTS)),
         lambda *_: None,
     ),
 }

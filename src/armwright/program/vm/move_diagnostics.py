@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import counted
 from armwright.motion.detour import Detour
+from armwright.motion.limited import limited_label, limited_motion
 from armwright.motion.plan import Obstacle
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm.recording import RunStage
@@ -32,7 +34,7 @@ _PATH_MESSAGES = {
 }
 # Farther away nobody counts tenths [mm].
 _LARGE_COORDINATE = 1e6
-_THROUGH_FRAMES = ("SPLINE", "BLEND")
+_THROUGH_FRAMES = ("SPLINE", "BLEND", "ARC")
 _METHODS = {"via": "by a via pose", "damped": "by damped least squares"}
 
 
@@ -48,7 +50,7 @@ def obstacle_location(obstacle: Obstacle, kind: str, goal_names: Sequence[str], 
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE``, ``BLEND`` or ``ARC``.
         goal_names: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
@@ -67,7 +69,7 @@ def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[st
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE``, ``BLEND`` or ``ARC``.
         around: method by which a detour was searched for; None where none was.
     """
     if obstacle.certain or kind == "PTP":
@@ -133,6 +135,30 @@ def clearance_warning(run: RunStage, wanted: float) -> Diagnostic | None:
         label=f"at {run.t0 + clearance.time:.3f} s; the cell wants {wanted * 1e3:g} mm",
         notes=(f"at {_position(np.array(clearance.point))} mm in the world",),
         helps=("a path farther away, by VIA, or a smaller `clearance_mm` under [motion] of the cell",),
+    )
+
+
+def speed_warning(run: RunStage, arm: Arm) -> Diagnostic | None:
+    """Return the warning about a stage whose tool is slower than was asked for; None where the arm could do that."""
+    if run.stage.unmet is None:
+        return None
+    asked, reached = run.stage.unmet
+    what, got = f"at {asked.speed * 1e3:g} mm/s", f"{reached.speed * 1e3:.4g} mm/s"
+    if not math.isfinite(asked.speed):
+        what, got = f"at {np.degrees(asked.rotation):g} deg/s", f"{np.degrees(reached.rotation):.4g} deg/s"
+    uses = limited_motion(arm, run.stage.trajectory).peaks(1) / arm.all_limits.speed
+    joint = int(uses.argmax())
+    limit = f"the speed limit of {limited_label(arm, joint)}"
+    if math.isfinite(asked.speed) and asked.speed > arm.tool_speed and run.stage.kind != "PTP":
+        limit = f"the largest speed of its tool, {arm.tool_speed * 1e3:.4g} mm/s"
+    return Diagnostic(
+        code="W405",
+        severity=Severity.WARNING,
+        message=f"{run.arm} cannot move {what} on the way to `{run.goal_names[-1]}`: it reaches {got}",
+        span=run.span,
+        label=f"begun at {run.t0:.3f} s",
+        notes=(f"its limit is {limit}",),
+        helps=("ask for less, or move nearer to the middle of its reach",),
     )
 
 

@@ -1,14 +1,27 @@
 """What the instructions of one MOVE ask for, gathered and checked."""
 
+from collections.abc import Mapping, Sequence
 from itertools import takewhile
+from types import MappingProxyType
 from typing import NamedTuple
 
+from armwright.arrays import Array
+from armwright.motion.tool_limits import ToolLimits
 from armwright.program.bytecode.instructions import Code, Form, Instruction, Op, Operand
 from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 from armwright.program.vm.machine import Machine, jump_target
 from armwright.program.vm.process import Guard, Process
 
+# The parts of a MOVE that are numbers.
+_NUMBERS = {
+    Op.MVSPD: "speed",
+    Op.MVBLD: "blend",
+    Op.MVDUR: "duration",
+    Op.MVVEL: "velocity",
+    Op.MVROT: "rotation",
+    Op.MVACC: "acceleration",
+}
 # The longest MOVE; more is a slip of units [s].
 _MAX_DURATION = 1e6
 # What may take a pose: of the operations in a condition all others take numbers.
@@ -24,16 +37,22 @@ class Goal(NamedTuple):
 
 
 class MoveRequest(NamedTuple):
-    """What the instructions of one MOVE ask for."""
+    """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is.
+
+    Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm.
+    """
 
     begin: Instruction
     form: Form
     goals: dict[str, Goal]
     speed: float
-    blend: float | None
+    blend: float | Array | None
     duration: float | None
     guards: list[Guard]
     span: Span
+    joints: Sequence[float] | str | None = None
+    tool: ToolLimits | None = None
+    fixed: Mapping[str, Array] = MappingProxyType({})
 
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
@@ -45,11 +64,19 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
     begin, parts = instructions[first], instructions[first + 1 : index]
     goals: dict[str, list[Goal]] = {"goal": [_goal(machine, process, begin.operands[1], begin)]}
     numbers: dict[Op, float] = {}
-    guards = []
+    guards: list[Guard] = []
+    joints: Sequence[float] | str | None = None
     for part in parts:
-        if part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
+        if part.op is Op.MVJNT:
+            joints = [machine.read_number(process, operand, part.span) for operand in part.operands]
+        elif part.op is Op.MVTGT:
+            joints = str(part.operands[0])
+        if part.op in (Op.MVJNT, Op.MVTGT):
+            label = " ".join(machine.code.source.slice(part.span).split()) or "JOINTS"
+            goals["goal"] = [Goal(label, part.op, part.span)]
+        elif part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
             goals[part.op] = [_goal(machine, process, operand, part) for operand in part.operands]
-        elif part.op in (Op.MVSPD, Op.MVBLD, Op.MVDUR):
+        elif part.op in _NUMBERS:
             numbers[part.op] = _clause_value(machine, process, part)
         elif part.op is Op.MVON:
             guards.append(_guard(machine, part))
@@ -61,17 +88,30 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         departure=goals[Op.MVDEP][0].label if Op.MVDEP in goals else None,
         straight=any(part.op is Op.MVSTR for part in parts),
         blend=Op.MVBLD in numbers,
+        circular=any(part.op is Op.MVCIR for part in parts),
     )
-    duration = numbers.get(Op.MVDUR)
+    duration, units = numbers.get(Op.MVDUR), machine.code.units
+    limits = {
+        name: numbers[op] * worth
+        for name, op, worth in (
+            ("speed", Op.MVVEL, units.metres),
+            ("rotation", Op.MVROT, units.radians),
+            ("acceleration", Op.MVACC, units.metres),
+        )
+        if op in numbers
+    }
+    at_speed = NORMAL_SPEED if duration is None and "speed" not in limits else HIGHEST_SPEED
     return MoveRequest(
         begin=begin,
         form=form,
         goals={goal.label: goal for goals_of_clause in goals.values() for goal in goals_of_clause},
-        speed=numbers.get(Op.MVSPD, NORMAL_SPEED if duration is None else HIGHEST_SPEED),
+        speed=numbers.get(Op.MVSPD, at_speed),
         blend=numbers.get(Op.MVBLD),
         duration=duration,
         guards=guards,
         span=step.span,
+        joints=joints,
+        tool=ToolLimits(**limits) if limits else None,
     )
 
 
@@ -94,7 +134,7 @@ def _make_labels_unique(goals: dict[str, list[Goal]]) -> None:
 
 
 def _clause_value(machine: Machine, process: Process, part: Instruction) -> float:
-    """Return speed, blend [m] or duration [s], checked."""
+    """Return speed, blend [m], duration [s] or a limit of the tool, in units of the program, checked."""
     operand = part.operands[0]
     value = machine.read_number(process, operand, part.span)
     name = f"{machine.operand_text(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
@@ -103,7 +143,7 @@ def _clause_value(machine: Machine, process: Process, part: Instruction) -> floa
             message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
             raise machine.error(process, "E207", message, part.span, "out of range")
         return value
-    quantity = "the blend" if part.op is Op.MVBLD else "the duration"
+    quantity = f"the {_NUMBERS[part.op]}"
     if part.op is Op.MVDUR and value > _MAX_DURATION:
         text = f"{quantity} {name} s is not possible"
         raise machine.error(process, "E231", text, part.span, f"expected {_MAX_DURATION:g} s or less")

@@ -15,7 +15,8 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
 from armwright.motion.plan import PlannedStage, tool_path_length
-from armwright.motion.trajectory import Trajectory
+from armwright.motion.tool_limits import ToolLimits
+from armwright.motion.trajectory import Trajectory, whole_ticks
 from armwright.physics.collisions import Collision, MoveCheck
 from armwright.physics.planned_move import PlannedMove
 from armwright.physics.planner import PlannedPath, PlanningError
@@ -51,6 +52,7 @@ def replanned(
     check: Callable[[PlannedMove], MoveCheck],
     *,
     fixed_duration: bool,
+    tool: ToolLimits | None = None,
 ) -> Replanned:
     """Return a MOVE with planned paths instead of the point-to-point stages on which it runs into something.
 
@@ -61,6 +63,7 @@ def replanned(
         plan: plans a path instead of a stage to one of several configurations.
         check: finds what a MOVE runs into.
         fixed_duration: whether no stage may take longer than it does.
+        tool: limits of the tool besides those of the joints.
     """
     done = Replanned(move, stages, {}, check(move))
     while machine.cell.plan and (collision := done.check.collision) is not None:
@@ -69,10 +72,10 @@ def replanned(
             break
         old = done.stages[k].trajectory
         try:
-            path = plan(done.move, k, _goals(machine, move.arm, old, last=k == len(stages) - 1))
+            path = plan(done.move, k, _goals(machine, move.arm, old, last=_is_free(done.stages, k)))
         except (PlanningError, IncapableArmError) as error:
             return done._replace(failure=str(error))
-        motion = path.trajectory
+        motion = _within_tool_limits(machine, move.arm, path.trajectory, tool)
         if fixed_duration and motion.duration > old.duration:
             failure = f"a path that was planned past it takes {motion.duration:.3f} s, not {old.duration:.3f} s"
             return done._replace(failure=failure)
@@ -84,6 +87,18 @@ def replanned(
         moved = attrs.evolve(done.move, stages=tuple(stage.trajectory for stage in new))
         done = Replanned(moved, new, {**done.paths, k: path}, check(moved))
     return done
+
+
+def _within_tool_limits(machine: Machine, arm: str, motion: Trajectory, tool: ToolLimits | None) -> Trajectory:
+    """Return a motion slowed so that the tool keeps its limits."""
+    factor = 1.0 if tool is None else tool.slowing(machine.cell.arms[arm].arm, motion)
+    return whole_ticks(motion.slowed(factor), machine.cell.period) if factor > 1 else motion
+
+
+def _is_free(stages: Sequence[PlannedStage], number: int) -> bool:
+    """Whether a stage may end in any configuration that takes its pose: it is the last, and JOINTS asks for none."""
+    goal = stages[number].goal
+    return number == len(stages) - 1 and (goal is None or goal.joints is None)
 
 
 def can_be_passed(collision: Collision, stage: PlannedStage) -> bool:

@@ -18,6 +18,7 @@ from armwright.program.vm.recording import TimedKind
 if TYPE_CHECKING:
     from armwright.physics.collisions import Collision, StageClearance
     from armwright.physics.planner import PlannedPath
+    from armwright.program.vm.move_request import MoveRequest
 
 
 @attrs.frozen
@@ -313,6 +314,25 @@ class Motion:
         return data if self.early_end is None else {**data, self.early_end.value: True}
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class MovesAhead:
+    """MOVEs that are to go over into the next one, and have not begun.
+
+    Attributes:
+        arm: the arm that is to move.
+        moved: the frame that shall come to the goals.
+        requests: what they ask for, in order.
+        poses: (4, 4) pose of the tool at the goal of each, in the base of the arm.
+        implied_affix: whether what is moved hangs on the arm only since the first of them.
+    """
+
+    arm: str
+    moved: str
+    requests: tuple[MoveRequest, ...] = ()
+    poses: tuple[Array, ...] = ()
+    implied_affix: bool = False
+
+
 @attrs.frozen
 class WaitReason:
     """Why a process does not go on.
@@ -369,6 +389,7 @@ class Process:
         waiting: why it does not go on; None when only the clock holds it.
         unfulfilled_wait: the event or the locks that it has not got yet, also while it is about to look again.
         motion: the MOVE running.
+        ahead: MOVEs that wait for the next one, to go over into it.
         pending_effect: what takes effect at ``wake_tick``.
         last_arm: named or moved last.
         locks: the variables it has locked, in the order of taking.
@@ -388,6 +409,7 @@ class Process:
     waiting: WaitReason | None = None
     unfulfilled_wait: WaitReason | None = None
     motion: Motion | None = None
+    ahead: MovesAhead | None = None
     pending_effect: PendingEffect | None = None
     last_arm: str | None = None
     locks: list[str] = attrs.field(factory=list)
