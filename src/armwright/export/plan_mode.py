@@ -34,7 +34,7 @@ _SAME_TIME = 1e-6
 _LOOKS = 65
 # Corners are rounded from no more than this part of the shorter leg on, so that two roundings never meet.
 _PART_OF_LEG = 0.4
-_SWITCHING = ("OPEN", "GRASP", "OPERATE")
+SWITCHING = ("OPEN", "GRASP", "OPERATE")
 # What takes no part in an export: it changes frames, or orders the branches of a program.
 _SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "END")
 
@@ -55,19 +55,19 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
             same time, a second arm, a device without an output, an arm without a convention.
     """
     refuse_guards(recording)
-    arm_name = _only_arm(recording)
+    arm_name = only_arm(recording)
     _refuse_parallel(recording)
     placed = recording.cell.arms[arm_name]
-    mapped = _mapped(recording, arm_name)
+    mapped = mapped_arm(recording, arm_name)
     solver = solver_of(planning_arm(placed.arm))
     statements: list[Statement] = []
-    for _, _, effect, stages in _events(recording):
+    for _, _, effect, stages in run_events(recording):
         if effect.kind == "MOVE":
             statements += [
                 statement for stage in stages for statement in _motion(stage, recording, solver, zones=zones)
             ]
-        elif effect.kind in _SWITCHING:
-            statements += _switching(effect, recording)
+        elif effect.kind in SWITCHING:
+            statements += switching(effect, recording)
         elif effect.kind == "PAUSE":
             statements.append(Wait(span=effect.span, seconds=effect.t1 - effect.t0))
         elif effect.kind == "PRINT":
@@ -123,7 +123,7 @@ def refuse_guards(recording: Recording) -> None:
             raise refusal(source, "E611", text, effect.span, "no controller is told so", helps=["leave it out"])
 
 
-def _only_arm(recording: Recording) -> str:
+def only_arm(recording: Recording) -> str:
     """Return the name of the arm that moved; the first of the cell where none did."""
     moved = dict.fromkeys(stage.arm for stage in recording.stages)
     if len(moved) > 1:
@@ -139,7 +139,7 @@ def _refuse_parallel(recording: Recording) -> None:
     """Refuse a run in which two things happened at the same time: their order would not be that of the run."""
     last: Effect | None = None
     busy = 0.0
-    for begin, end, effect, _ in _events(recording):
+    for begin, end, effect, _ in run_events(recording):
         if last is not None and begin < busy - _SAME_TIME:
             source = recording.code.source
             text = f"{effect.kind} begins while {last.kind} in line {source.line(last.span.start)} is under way"
@@ -149,7 +149,7 @@ def _refuse_parallel(recording: Recording) -> None:
             last, busy = effect, end
 
 
-def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
+def mapped_arm(recording: Recording, arm_name: str) -> ControllerArm:
     """Return the arm with the convention of its controller.
 
     Raises:
@@ -172,7 +172,7 @@ def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
 # ---- events --------------------------------------------------------------------------------------------------------
 
 
-def _events(recording: Recording) -> Iterator[_Event]:
+def run_events(recording: Recording) -> Iterator[_Event]:
     """Give what happened, in order: begin, end, effect, and the stages of a MOVE."""
     stages = {name: iter([stage for stage in recording.stages if stage.arm == name]) for name in recording.cell.arms}
     following = {name: next(ones, None) for name, ones in stages.items()}
@@ -192,10 +192,14 @@ def _belongs(stage: RunStage, effect: Effect) -> bool:
     return stage.span == effect.span and effect.t0 - _SAME_TIME <= stage.t0 <= effect.t1 + _SAME_TIME
 
 
-def _switching(effect: Effect, recording: Recording) -> list[Statement]:
+def switching(effect: Effect, recording: Recording) -> list[Statement]:
     """Return the statements of an OPEN, a GRASP or an OPERATE."""
     source, cell = recording.code.source, recording.cell
     words = effect.text.split()
+    if "seconds" in effect.data or "value" in effect.data:
+        what = "PULSE switches an output by itself" if "seconds" in effect.data else "a device is set to a number"
+        helps = ["export the program by `--mode program`", "or export the motion alone by `armwright export ros2`"]
+        raise refusal(source, "E619", f"{what}, which is not written in plan mode", effect.span, "here", helps=helps)
     if effect.kind == "OPERATE":
         device, on = words[0].upper(), words[1] == "ON"
         output, where = (cell.devices or {}).get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
@@ -261,7 +265,7 @@ def _lines(stage: RunStage, poses: Array, blend: float | None, solver: Solver) -
         stage=stage,
         poses=poses,
         q=motion(np.append(times[near], motion.duration)),
-        zones=np.zeros(len(poses)) if stops or blend is None else _zones(X[0], poses, blend),
+        zones=np.zeros(len(poses)) if stops or blend is None else blend_zones(X[0], poses, blend),
         duration=motion.duration,
         speed=float(speeds.max()),
         turn_speed=float(np.max(turns)),
@@ -269,7 +273,7 @@ def _lines(stage: RunStage, poses: Array, blend: float | None, solver: Solver) -
     )
 
 
-def _zones(start: Array, poses: Sequence[Array] | Array, blend: float) -> Array:
+def blend_zones(start: Array, poses: Sequence[Array] | Array, blend: float) -> Array:
     """Return from where on each corner is rounded [m]: as far as is asked for, and never beyond 0.4 of a leg."""
     corners = [start, *poses]
     legs = [float(np.linalg.norm(b[:3, 3] - a[:3, 3])) for a, b in pairwise(corners)]

@@ -3,6 +3,8 @@
 _URSCRIPT = """
 and break continue def elif else end enum false global halt if in join kill local mod movej movel movep not or p pass
 return run servoj set_standard_digital_out set_tcp sleep stopj sync textmsg thread true while xor
+atan2 cos floor get_inverse_kin get_standard_digital_in get_standard_digital_out get_steptime norm point_dist
+pose_inv pose_trans rpy2rotvec sin sqrt str_cat tan to_str
 """
 _KRL = """
 and anin anout axis b_and b_exor b_not b_or bas bool brake bwdstart c_dis c_ori c_ptp c_vel case cast_from cast_to char
