@@ -14,6 +14,7 @@ from armwright.export.checkers import (
     fanuc as fanuc_checker,
     krl as krl_checker,
     rapid as rapid_checker,
+    krl_machine,
     urscript as urscript_checker,
     urscript_machine,
 )
@@ -29,7 +30,7 @@ from armwright.export.proof import Comparison, Proof
 from armwright.export.targets import Mode, Target
 from armwright.export.translation.expected import expected
 from armwright.export.translation.translate import translate_program
-from armwright.export.writers import drive_csv, fanuc, krl, rapid, ros2, urscript, urscript_program
+from armwright.export.writers import drive_csv, fanuc, krl, krl_program, rapid, ros2, urscript, urscript_program
 from armwright.program.api import Compilation, compile as compile_program, run
 from armwright.program.language.source import Source
 from armwright.program.vm.recording import Recording
@@ -43,6 +44,7 @@ _LANGUAGES: Mapping[Target, tuple[ModuleType, ModuleType]] = {
 # Those in which a program itself can be written, and not only what it did in the cell.
 _PROGRAMS: Mapping[Target, tuple[ModuleType, ModuleType]] = {
     "urscript": (urscript_program, urscript_machine),
+    "krl": (krl_program, krl_machine),
 }
 # Languages that do not say in lengths how corners are rounded.
 _WITHOUT_ZONES = ("fanuc",)
@@ -126,7 +128,7 @@ def export_compiled(target: Target, compiled: Compilation, recording: Recording,
     written = writer.write(code)
     wanted = expected(code, recording)
     try:
-        done = machine.run(written.text, CellWorld(recording.cell, wanted.ends))
+        done = machine.run([*written.files.values()], CellWorld(recording.cell, wanted.ends))
     except CheckError as error:
         raise CheckFailedError(f"the exported program cannot be run: {error}") from error
     proof = Proof(
@@ -137,7 +139,7 @@ def export_compiled(target: Target, compiled: Compilation, recording: Recording,
         notes=code.notes,
         sources=tuple(_source_lines(code.mapped.convention)),
     )
-    return _proved(target, {written.name: written.text}, proof)
+    return _proved(target, written.files, proof)
 
 
 def export_run(target: Target, recording: Recording, name: str) -> ExportedProgram:

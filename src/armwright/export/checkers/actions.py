@@ -23,6 +23,7 @@ class JointAction:
             positions that do so, those with the words of ``configuration``, and of them the nearest ones.
         near: (n,) to what they are nearest, as the controller counts; None for where the arm is.
         configuration: words of the controller for a posture, by name; empty where it is free.
+        kept: names of such words that are those of where the arm is.
         joint_speed: of the joint that has the longest way that is asked for [rad/s]; None where it is not said.
         rounding: by how much the duration may be rounded up, for the digits of the language [s].
     """
@@ -37,6 +38,7 @@ class JointAction:
     X: Array | None = None
     near: Array | None = None
     configuration: Mapping[str, int] = attrs.field(factory=dict)
+    kept: tuple[str, ...] = ()
     joint_speed: float | None = None
 
 

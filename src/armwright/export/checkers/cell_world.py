@@ -29,6 +29,11 @@ class CellWorld:
         self._inputs = _names(addressed)
         self._outputs = _names(cell.devices or {})
 
+    @property
+    def now(self) -> float:
+        """The time on the clock of the run [s]."""
+        return self._signals.now
+
     def read(self, address: int | str, *, is_input: bool) -> bool:
         """Return whether an input or an output is on."""
         name = (self._inputs if is_input else self._outputs).get(address)

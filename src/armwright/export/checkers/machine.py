@@ -23,6 +23,10 @@ class World(Protocol):
 
     step: float
 
+    @property
+    def now(self) -> float:
+        """The time on its clock [s]."""
+
     def read(self, address: int | str, *, is_input: bool) -> bool:
         """Return whether an input or an output is on."""
 

@@ -85,7 +85,9 @@ class _ComparingRun(Comparing):
 
     def _has_words(self, q: Array, action: JointAction) -> bool:
         words = self._postures.words(self._program.mapped.joints(q))
-        return all(value in words[word] for word, value in action.configuration.items())
+        here = self._postures.words(self._program.mapped.joints(self._q)) if action.kept else {}
+        asked = all(value in words[word] for word, value in action.configuration.items())
+        return asked and all(words[word] & here[word] for word in action.kept)
 
     def _duration(self, found: float, planned: float, action: JointAction | LineAction | WaitAction) -> None:
         if isinstance(action, WaitAction):

@@ -35,12 +35,13 @@ from armwright.export.checkers.orientations import from_rotation_vector, turn
 _JOINTS = 6
 
 
-def run(text: str, world: World) -> ReadProgram:
+def run(texts: Sequence[str], world: World) -> ReadProgram:
     """Return what a program in URScript does in a cell.
 
     Raises:
         CheckError: it has what the machine does not know, or does not come to its end.
     """
+    (text,) = texts
     tree = parse("urscript", text)
     functions = [node for node in tree.children if node.data == "function"]
     calls = [node for node in tree.children if node.data == "call"]

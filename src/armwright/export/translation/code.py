@@ -109,7 +109,8 @@ class Passages:
 
     Attributes:
         reached: whether it was passed at all; else the numbers are those of a slow motion near the start.
-        q: (k, m, n) joint positions at the ends of its m legs, each time.
+        start: (k, n) joint positions where it began, each time.
+        q: (k, m, n) those at the ends of its m legs.
         near: (n,) in the middle of those at its end.
         joint_speed: the largest of a joint at normal speed [rad/s].
         joint_acceleration: the largest [rad/s²].
@@ -123,6 +124,7 @@ class Passages:
     """
 
     reached: bool
+    start: Array = attrs.field(converter=read_only)
     q: Array = attrs.field(converter=read_only)
     near: Array = attrs.field(converter=read_only)
     joint_speed: float

@@ -67,6 +67,7 @@ class Run:
         slowest = float(limits.min())
         return Passages(
             reached=False,
+            start=q[None],
             q=np.broadcast_to(q, (1, legs, len(q))),
             near=q,
             joint_speed=_SLOW_PART * slowest,
@@ -90,6 +91,7 @@ class Run:
         zones = [_zones(stage, self._solver, legs) for stage in stages]
         return Passages(
             reached=True,
+            start=np.array([stage.motion(0.0) for stage in stages]),
             q=ends,
             near=(last.min(axis=0) + last.max(axis=0)) / 2,
             joint_speed=max((float(v.max()) * scale for v, _, scale in rates), default=float(limits.min())),

@@ -58,8 +58,7 @@ def value_of(context: Context, node: tree.Node) -> Value:  # noqa: PLR0911 - one
             return _matrix(context, node)
         case tree.Function():
             return _function(context, node)
-        case _:
-            context.refuse_construct(node)
+    return context.refuse_construct(node)
 
 
 def operate(context: Context, name: str, *arguments: Value, node: tree.Node) -> Value:

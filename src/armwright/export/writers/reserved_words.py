@@ -13,6 +13,7 @@ enddat endfct endfold endfor endif endloop endswitch endwhile enum exit exor ext
 halt if import int interrupt is lin lin_rel loop maximum minimum not on or path pos prio ptp ptp_rel public
 pulse real repeat return sec signal slin spl spline sptp strclear struc switch then to trigger true until wait when
 while
+abs atan2 cos sin sqrt state_t swrite tan
 """
 _RAPID = """
 alias and backward case confl connect const default div do else elseif endfor endfunc endif endmodule endproc endrecord
