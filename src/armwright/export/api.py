@@ -15,6 +15,7 @@ from armwright.export.checkers import (
     krl as krl_checker,
     rapid as rapid_checker,
     krl_machine,
+    rapid_machine,
     urscript as urscript_checker,
     urscript_machine,
 )
@@ -30,7 +31,7 @@ from armwright.export.proof import Comparison, Proof
 from armwright.export.targets import Mode, Target
 from armwright.export.translation.expected import expected
 from armwright.export.translation.translate import translate_program
-from armwright.export.writers import drive_csv, fanuc, krl, krl_program, rapid, ros2, urscript, urscript_program
+from armwright.export.writers import drive_csv, fanuc, krl, krl_program, rapid, rapid_program, ros2, urscript, urscript_program
 from armwright.program.api import Compilation, compile as compile_program, run
 from armwright.program.language.source import Source
 from armwright.program.vm.recording import Recording
@@ -45,6 +46,7 @@ _LANGUAGES: Mapping[Target, tuple[ModuleType, ModuleType]] = {
 _PROGRAMS: Mapping[Target, tuple[ModuleType, ModuleType]] = {
     "urscript": (urscript_program, urscript_machine),
     "krl": (krl_program, krl_machine),
+    "rapid": (rapid_program, rapid_machine),
 }
 # Languages that do not say in lengths how corners are rounded.
 _WITHOUT_ZONES = ("fanuc",)

@@ -171,6 +171,7 @@ class Comparing:
             self._statement(statement, actions)
         for action in actions:
             self.statements.add(1, action.line)
+        self._end_of_program()
         tallies = (
             self.statements,
             self.places,
@@ -202,6 +203,9 @@ class Comparing:
                     self._duration(wait.seconds, seconds, wait)
             case Say(text=text):
                 self._text(text, actions)
+
+    def _end_of_program(self) -> None:
+        """Compare what can be compared only when all has been done."""
 
     def _next(self, actions: Iterator[Action], kind: type[_Kind]) -> _Kind | None:
         """Return the next action, which is to be of a kind; None where it is none."""

@@ -40,6 +40,10 @@ def compare_run(read: ReadProgram, program: ControllerProgram) -> tuple[Comparis
 class _ComparingRun(Comparing):
     """A program that a machine has run, beside the run in the cell."""
 
+    def __init__(self, program: ControllerProgram) -> None:
+        super().__init__(program)
+        self._wrong: dict[int, int] = {}
+
     def _statement(self, statement: Statement, actions: Iterator[Action]) -> None:
         if not isinstance(statement, PulseOutput):
             super()._statement(statement, actions)
@@ -94,6 +98,17 @@ class _ComparingRun(Comparing):
             super()._duration(found, planned, action)
         elif planned:
             self.times.add(max(abs(found - planned) - action.rounding - _SAME_TIME, 0.0), action.line)
+
+    def _configuration(self, action: LineAction) -> None:
+        """Take note of wrong words: on lines controllers do not need them, and those of one pass are enough."""
+        if action.configuration:
+            words = self._postures.words(self._program.mapped.joints(self._q))
+            wrong = sum(value not in words[word] for word, value in action.configuration.items())
+            self._wrong[action.line] = min(wrong, self._wrong.get(action.line, wrong))
+
+    def _end_of_program(self) -> None:
+        for line, wrong in self._wrong.items():
+            self.postures.add(wrong, line)
 
     def _width(self, goal: StageGoal) -> float | None:
         return goal.blend if goal.blend is not None else goal.corner

@@ -87,6 +87,7 @@ class Context:
         reached: of the MOVEs, by where they begin, whether the run comes to them.
         reads_hand: whether some value needs the pose of the tool.
         keeps_hand: whether a variable has the pose of the tool.
+        notes: what is to be known of the translation, with lines.
         used: names that the program writes.
         outputs: switched by OPERATE, in order.
     """
@@ -113,6 +114,7 @@ class Context:
     reads_hand: bool = False
     keeps_hand: bool = False
     used: frozenset[str] = frozenset()
+    notes: dict[str, None] = attrs.field(factory=dict)
     outputs: dict[str, Output] = attrs.field(factory=dict)
 
     @property

@@ -33,14 +33,13 @@ def assign(context: Context, node: tree.Assign) -> None:
     name = name_of(node.target)
     value = value_of(context, node.value)
     if context.type_of(name).kind is VariableKind.FRAME:
-        _place(context, node, value)
+        place_frame(context, node, *frame_of(context, node.target), value)
     else:
         context.assign(plain_variable(context, node.target), value, node.span)
 
 
-def _place(context: Context, node: tree.Assign, value: Value) -> None:
+def place_frame(context: Context, node: tree.Node, name: str, variable: Variable, value: Value) -> None:
     """Give a frame a pose in the world, and move what hangs on it."""
-    name, variable = frame_of(context, node.target)
     attachments, span = context.attachments, node.span
     if not attachments[name].parents:
         attachments.set(name, IN_THE_WORLD)

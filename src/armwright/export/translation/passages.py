@@ -13,6 +13,7 @@ from armwright.export.translation.code import Passages
 from armwright.motion.solver import Solver, solver_of
 from armwright.program.language.units import NORMAL_SPEED
 from armwright.program.vm.recording import Recording, RunStage
+from armwright.spatial.poses import from_noap
 from armwright.spatial.rotations import angle_between
 
 # Points of a stage at which the speed of the tool is looked at.
@@ -39,6 +40,16 @@ class Run:
         for _, _, effect, stages in run_events(recording):
             for number, stage in enumerate(stages):
                 self._stages.setdefault((effect.span.start, number), []).append(stage)
+
+    def seen(self, frame: str) -> list[Array]:
+        """Return the poses (4, 4) in the world at which the camera has found a frame, without those that are alike."""
+        found: list[Array] = []
+        for effect in self._recording.effects:
+            if effect.kind == "READ" and effect.data.get("frame") == frame:
+                X = from_noap(effect.data["pose"])
+                if not any(np.allclose(X, other, rtol=0, atol=1e-9) for other in found):
+                    found.append(X)
+        return found
 
     def passages(self, span_start: int, number: int, legs: int) -> Passages:
         """Return what a stage of the MOVE that begins there did.

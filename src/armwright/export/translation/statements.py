@@ -6,12 +6,15 @@ from armwright.cell.outputs import Output
 from armwright.export.translation.code import (
     Choice,
     Count,
+    FunctionCall,
     Halt,
     Loop,
     MoveTo,
     Number,
     Pause,
+    Pose,
     Print,
+    Procedure,
     Return,
     Statement,
     Switch,
@@ -20,7 +23,7 @@ from armwright.export.translation.code import (
     WaitUntil,
 )
 from armwright.export.translation.context import Context, Translators
-from armwright.export.translation.frame_statements import hang
+from armwright.export.translation.frame_statements import hang, place_frame
 from armwright.export.translation.frames import Hanging
 from armwright.export.translation.values import (
     frame_of,
@@ -266,6 +269,24 @@ def read_system(context: Context, node: tree.ReadSystem) -> None:
     require_arm(context, node.arm)
 
 
+def read_visions(context: Context, node: tree.ReadVisions) -> None:
+    """Translate READ VISIONS: a function for each frame, which answers as in the run until it asks a real camera."""
+    for target in node.targets:
+        name, variable = frame_of(context, target)
+        seen = context.run.seen(variable.key)
+        if len(seen) != 1 or variable.indices:
+            text = "the function that stands for the camera has one answer, and the run had several, or none"
+            context.refuse(node.span, text, "the camera is asked here", "export the run by `--mode plan`", code="E620")
+        key = f"CAMERA {variable.key}"
+        if all(one.key != key for one in context.procedures):
+            answer = Return(span=node.span, value=Pose(seen[0]))
+            context.procedures.append(Procedure(key=key, parameters=(), result="pose", body=(answer,)))
+        line = context.compiled.source.line(node.span.start)
+        note = f"line {line}: a function answers for the camera as in the run: let it ask the camera of the controller"
+        context.notes.setdefault(note)
+        place_frame(context, node, name, variable, FunctionCall(key, ()))
+
+
 def pause(context: Context, node: tree.Pause) -> None:
     """Translate a PAUSE."""
     context.out.append(Pause(span=node.span, seconds=value_of(context, node.duration)))
@@ -325,6 +346,7 @@ TRANSLATORS: Translators = {
     tree.Operate: operate_device,
     tree.Pulse: pulse,
     tree.ReadSystem: read_system,
+    tree.ReadVisions: read_visions,
     tree.Pause: pause,
     tree.WaitUntil: wait_until,
     tree.Print: print_,

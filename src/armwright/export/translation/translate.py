@@ -122,6 +122,7 @@ def _called(context: Context) -> tuple[Procedure, ...]:
 def _notes(context: Context) -> Iterator[str]:
     """Give what is to be known of the translation, with lines."""
     source = context.compiled.source
+    yield from context.notes
     for start, reached in sorted(context.reached.items()):
         if not reached:
             yield f"line {source.line(start)}: the run does not come to this MOVE: it is slow, and not compared"

@@ -20,6 +20,8 @@ alias and backward case confl connect const default div do else elseif endfor en
 endtest endtrap endwhile error exit false for from func goto if inout load0 local main mod module moveabsj movel
 nostepin not noview or pers proc raise readonly record retry return setdo step sysmodule test then to tool0 tool_1
 tpwrite trap true trynext undo var viewonly waittime while with wobj0 xor
+abs atan2 bool confj confdata cos dinput distance doutput movej num orientzyx pose poseinv posemult pulsedo robtarget
+round sin sqrt string tan valtostr waituntil
 """
 _FANUC = """
 abort and call cnt do div else end endfor endif fine for if jmp lbl message mod off on or override pause pulse run
