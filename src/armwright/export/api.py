@@ -31,7 +31,17 @@ from armwright.export.proof import Comparison, Proof
 from armwright.export.targets import Mode, Target
 from armwright.export.translation.expected import expected
 from armwright.export.translation.translate import translate_program
-from armwright.export.writers import drive_csv, fanuc, krl, krl_program, rapid, rapid_program, ros2, urscript, urscript_program
+from armwright.export.writers import (
+    drive_csv,
+    fanuc,
+    krl,
+    krl_program,
+    rapid,
+    rapid_program,
+    ros2,
+    urscript,
+    urscript_program,
+)
 from armwright.program.api import Compilation, compile as compile_program, run
 from armwright.program.language.source import Source
 from armwright.program.vm.recording import Recording

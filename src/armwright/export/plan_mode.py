@@ -1,11 +1,13 @@
 """Plan mode: a program is run in its cell, and what the arm did becomes the statements of a controller."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.errors import UnsupportedArmError
@@ -159,14 +161,28 @@ def mapped_arm(recording: Recording, arm_name: str) -> ControllerArm:
     span = recording.stages[0].span if recording.stages else Span(0, 0)
     convention = find_convention(placed.arm, placed.controller.convention)
     if convention is None:
-        text = f"no convention says how the controller of '{placed.arm.name}' counts its joints"
-        known = ", ".join(sorted(conventions()))
-        helps = [f'name one in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; known: {known}']
+        text = f"no source that was read says how the controller of '{placed.arm.name}' counts its joints"
+        fitting = _fitting(placed.arm)
+        helps = [
+            f'name the convention in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; '
+            f"known: {', '.join(sorted(conventions()))}",
+            f"the axes of this arm can stand as those of: {', '.join(fitting) or 'none of them'}",
+        ]
         raise refusal(source, "E614", text, span, f"{arm_name} moves here", helps=helps)
     try:
         return controller_arm(placed.arm, convention)
     except UnsupportedArmError as error:
         raise refusal(source, "E614", str(error), span, f"{arm_name} moves here") from None
+
+
+def _fitting(arm: Arm) -> list[str]:
+    """Return the names of the conventions as which the axes of an arm can stand."""
+    found = []
+    for name, convention in sorted(conventions().items()):
+        with suppress(UnsupportedArmError):
+            controller_arm(arm, convention)
+            found.append(name)
+    return found
 
 
 # ---- events --------------------------------------------------------------------------------------------------------

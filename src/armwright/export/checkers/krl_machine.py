@@ -211,15 +211,11 @@ class _Machine(Machine):
             # Without a status that of before is kept, and without a turn the axes take the shortest way.
             part, kept = self._percent / 100.0, () if "S" in words else ("S",)
             q = np.zeros(len(_AXES))
-            self.done(
-                JointAction(line=line, q=q, X=X, configuration=words, kept=kept, speed_part=part, passes=passes)
-            )
+            self.done(JointAction(line=line, q=q, X=X, configuration=words, kept=kept, speed_part=part, passes=passes))
         elif kind.upper() == "LIN":
             zone = self.system.get("$APO.CDIS", 0.0) * 1e-3 if passes else 0.0
             speed, turn = self.system.get("$VEL.CP"), float(np.deg2rad(self.system.get("$VEL.ORI1", 0.0)))
-            self.done(
-                LineAction(line=line, X=X, configuration=words, speed=speed, turn_speed=turn, zone=zone)
-            )
+            self.done(LineAction(line=line, X=X, configuration=words, speed=speed, turn_speed=turn, zone=zone))
         else:
             raise CheckError(f"line {line}: the machine knows PTP and LIN alone")
 
@@ -343,7 +339,9 @@ class _Machine(Machine):
     def _unit(self, unit: Any, arguments: list[Any], line: int) -> Any:
         """Run a procedure or function."""
         _, parameters, *body = unit.children if unit.data == "procedure" else unit.children[1:]
-        named = [] if parameters is None else [[str(part).upper() for part in one.children] for one in parameters.children]
+        named = (
+            [] if parameters is None else [[str(part).upper() for part in one.children] for one in parameters.children]
+        )
         if len(named) != len(arguments) or any(way != "IN" for _, way in named):
             raise CheckError(f"line {line}: expected {len(named)} arguments by value")
         self.frames.append({name: value for (name, _), value in zip(named, arguments, strict=True)})

@@ -144,7 +144,7 @@ class _Machine(Machine):
             scope[str(name).lower()] = now
             self.block(body.children)
             now += by
-        del scope[str(name).lower()]
+        scope.pop(str(name).lower(), None)
         if hidden is not None:
             scope[str(name).lower()] = hidden
 

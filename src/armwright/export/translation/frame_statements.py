@@ -31,8 +31,8 @@ def assign(context: Context, node: tree.Assign) -> None:
     if isinstance(node.target, tree.ArmName) or is_arm(name_of(node.target).key):
         context.refuse_construct(node)
     name = name_of(node.target)
-    value = value_of(context, node.value)
-    if context.type_of(name).kind is VariableKind.FRAME:
+    kind, value = context.type_of(name).kind, value_of(context, node.value)
+    if kind is VariableKind.FRAME:
         place_frame(context, node, *frame_of(context, node.target), value)
     else:
         context.assign(plain_variable(context, node.target), value, node.span)

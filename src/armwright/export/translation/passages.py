@@ -140,10 +140,9 @@ def _tool_rates(stage: RunStage, solver: Solver, limits: Array) -> tuple[float, 
     speeds = np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=-1) / step
     turns = np.asarray(angle_between(X[:-1, :3, :3], X[1:, :3, :3])) / step
     loads = (np.abs(np.diff(q, axis=0)) / step / limits).max(axis=-1)
-    borne = [
-        _BORNE * float((rates / loads)[loads > _AT_REST].min()) for rates in (speeds, turns) if (loads > _AT_REST).any()
-    ]
-    fastest = [min(float(rates.max()), most) for rates, most in zip((speeds, turns), borne, strict=False)]
+    moving = loads > _AT_REST
+    borne = [_BORNE * float((rates[moving] / loads[moving]).min(initial=np.inf)) for rates in (speeds, turns)]
+    fastest = [min(float(rates.max()), most) for rates, most in zip((speeds, turns), borne, strict=True)]
     return fastest[0], fastest[1], float(np.abs(np.diff(speeds)).max() / step)
 
 

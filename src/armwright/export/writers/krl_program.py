@@ -214,7 +214,10 @@ class _Writer:
         return text
 
     def _procedure(self, one: Procedure) -> list[str]:
-        name, parameters = self._names(one.key), [(self._names(key), self._values.type(key)) for key, _ in one.parameters]
+        name, parameters = (
+            self._names(one.key),
+            [(self._names(key), self._values.type(key)) for key, _ in one.parameters],
+        )
         listed = ",".join(f"{key}:IN" for key, _ in parameters)
         declared = [f"DECL {kind} {key}" for key, kind in parameters]
         body = [f"  {line}" for line in [*declared, *self._block(one.body)]]
@@ -227,7 +230,7 @@ class _Writer:
         return [
             line
             for name in self._values.helpers
-            for line in ("", *_HELPERS[name].format(name=self._names(name)).splitlines())
+            for line in ("", *HELPERS[name].format(name=self._names(name)).splitlines())
         ]
 
     def _outputs_off(self) -> list[str]:
@@ -383,7 +386,7 @@ class _Writer:
 
 
 _MESSAGE = (("MESSAGE", "CHAR"), ("STATE", "STATE_T"), ("OFFSET", "INT"))
-_HELPERS = {
+HELPERS = {
     "SHIFTED": """\
 DEFFCT FRAME {name}(arg_x:IN,arg_y:IN,arg_z:IN)
   DECL REAL arg_x,arg_y,arg_z

@@ -165,7 +165,9 @@ class _Writer:
         """Return the file."""
         code = self._code
         start = absolute(code.mapped.joints(code.placed.start), SLOW, "fine")
-        initial = [f"{self._names(one.key)}:={self._values.text(one.initial)};" for one in code.declarations if not one.sizes]
+        initial = [
+            f"{self._names(one.key)}:={self._values.text(one.initial)};" for one in code.declarations if not one.sizes
+        ]
         body = ["ConfL\\Off;", f"{start};", *initial, *self._block(code.statements), *self._outputs_off()]
         routines = [line for one in code.procedures for line in ("", *self._procedure(one))]
         helpers = [
@@ -304,7 +306,9 @@ class _Writer:
                 text = "this MOVE ends in several postures of the arm, and its target is to have one configuration"
                 helps = ["write it for each of them"]
                 raise refusal(self._code.source, "E620", text, one.span, "on this MOVE", helps=helps)
-            line = f"{motion} {self._target(value, words[0])},{self._rate(one)},{zone_text(zone)},{TOOL}\\WObj:={_WORLD};"
+            line = (
+                f"{motion} {self._target(value, words[0])},{self._rate(one)},{zone_text(zone)},{TOOL}\\WObj:={_WORLD};"
+            )
             yield from ("ConfJ\\Off;", line, "ConfJ\\On;") if free else (line,)
 
     def _target(self, value: Value, words: tuple[int, int, int, int]) -> str:
