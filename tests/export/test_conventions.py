@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from armwright import load_arm
 from armwright.errors import UnknownNameError, UnsupportedArmError
-from armwright.export.checkers.comparison import _Model
+from armwright.export.checkers.comparison import Model
 from armwright.export.checkers.posture import PostureReader
 from armwright.export.conventions import ControllerArm, controller_arm, conventions, find_convention
 from armwright.export.writers.posture import Posture, confdata, postures, status_and_turn
@@ -36,7 +36,7 @@ def posture(mapped: ControllerArm, q: np.ndarray) -> Posture:
 
 def flange(mapped: ControllerArm, shown: list[float]) -> np.ndarray:
     """The flange, seen from the base frame of the controller, at joint positions that it shows [deg]."""
-    q = _Model(mapped).joints(np.radians(shown))
+    q = Model(mapped).joints(np.radians(shown))
     return np.linalg.inv(mapped.X_BC) @ forward(mapped.arm, q) @ np.linalg.inv(mapped.X_CT)
 
 
@@ -69,7 +69,7 @@ def test_turn_of_kuka() -> None:
     """The turn has a bit for each negative axis."""
     case = PUBLISHED["kuka_turn"][0]
     mapped = mapped_arm("krl")
-    q = _Model(mapped).joints(np.radians(case["q"]))
+    q = Model(mapped).joints(np.radians(case["q"]))
 
     assert status_and_turn(posture(mapped, q))[1] == case["T"]
     assert PostureReader(mapped).words(mapped.joints(q))["T"] >= {case["T"]}
@@ -82,7 +82,7 @@ def test_taught_points_of_kuka(case: dict[str, Any]) -> None:
     q = np.radians([-60.0 if bit else 60.0 for bit in bits])
     mapped = mapped_arm("krl")
 
-    status, turn = status_and_turn(posture(mapped, _Model(mapped).joints(q)))
+    status, turn = status_and_turn(posture(mapped, Model(mapped).joints(q)))
 
     assert turn == case["T"]
     assert (status & 6, not bits[2]) == (case["S"] & 6, True)
@@ -109,7 +109,7 @@ def test_targets_of_an_irb120(case: dict[str, Any]) -> None:
     np.testing.assert_allclose(X[:3, 3] * 1e3, case["position"], atol=HUNDREDTH)
     assert Rotation.from_matrix(X[:3, :3].T @ R).magnitude() < 1e-4
     if "confdata" in case:
-        q = _Model(mapped).joints(np.radians(case["q"]))
+        q = Model(mapped).joints(np.radians(case["q"]))
         assert list(confdata(posture(mapped, q))) == case["confdata"]
         reached = inverse(mapped.arm, forward(mapped.arm, q)).branches
         assert sum(list(confdata(posture(mapped, branch.q))) == case["confdata"] for branch in reached) == 1
@@ -120,7 +120,7 @@ def test_cfx_of_an_irb1660(case: dict[str, Any]) -> None:
     """The configuration of published joints is the published one, by both ways of computing it."""
     mapped = controller_arm(IRB1660, conventions()["abb"])
     for shown in case["q"]:
-        q = _Model(mapped).joints(np.radians(shown))
+        q = Model(mapped).joints(np.radians(shown))
 
         assert confdata(posture(mapped, q))[3] == case["cfx"]
         assert PostureReader(mapped).words(mapped.joints(q))["cfx"] == {case["cfx"]}
@@ -132,7 +132,7 @@ def test_all_eight_configurations_differ() -> None:
     for target, word in (("rapid", lambda p: confdata(p)[3]), ("krl", lambda p: status_and_turn(p)[0])):
         mapped = mapped_arm(target)
         for _ in range(20):
-            q = _Model(mapped).joints(rng.uniform(-0.6, 0.6, 6) + np.radians([0, -60, 80, 0, 40, 0]))
+            q = Model(mapped).joints(rng.uniform(-0.6, 0.6, 6) + np.radians([0, -60, 80, 0, 40, 0]))
             branches = [branch.q for branch in inverse(mapped.arm, forward(mapped.arm, q), q).branches]
 
             assert len({word(posture(mapped, branch)) for branch in branches}) == len(branches)
@@ -179,7 +179,7 @@ def test_joints_there_and_back(target: str) -> None:
     mapped = mapped_arm(target)
     q = np.random.default_rng(1).uniform(-2, 2, (50, 6))
 
-    np.testing.assert_allclose(_Model(mapped).joints(mapped.joints(q)), q, atol=1e-14)
+    np.testing.assert_allclose(Model(mapped).joints(mapped.joints(q)), q, atol=1e-14)
 
 
 def test_arms_that_do_not_fit() -> None:

@@ -14,7 +14,7 @@ from armwright.export.checkers import (
     rapid as rapid_checker,
     urscript as urscript_checker,
 )
-from armwright.export.checkers.comparison import _Model, compare
+from armwright.export.checkers.comparison import Model, compare
 from armwright.export.checkers.orientations import angle_apart
 from armwright.export.checkers.posture import PostureReader
 from armwright.export.plan_mode import plan_statements
@@ -115,7 +115,7 @@ def test_random_targets(target: str, sample: Any) -> None:
     """Joint positions and poses anywhere come back within a micrometre and 10 µrad, with words that the joints have."""
     writer, checker = LANGUAGES[target]
     mapped, many, per_file = mapped_arm(target), sample.count(100_000), 50
-    model, reader = _Model(mapped), PostureReader(mapped)
+    model, reader = Model(mapped), PostureReader(mapped)
     plan = attrs.evolve(plan_statements(recorded("BEGIN PAUSE 0.1 END.", target), "x"), mapped=mapped)
     pause, worst = plan.statements[0], np.zeros(3)
     for rng in sample.cases(-(-many // per_file)):

@@ -28,6 +28,7 @@ CELLS = {
     "stacking": "stanford_cell",
     "palletise": "stanford_cell",
     "weld": "stanford_cell",
+    "sort": "ur5_cell",
     "gearbox": "puma_cell",
     "around": "puma_cell",
     "peg": "peg_cell",

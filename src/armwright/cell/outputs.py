@@ -7,7 +7,7 @@ from armwright.arrays import Array, read_only
 
 @attrs.frozen(kw_only=True)
 class Output:
-    """A digital output of a controller.
+    """A digital output of a controller, or an input.
 
     Attributes:
         number: by which most controllers know it; None where only its name is known.

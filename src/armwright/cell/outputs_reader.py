@@ -18,12 +18,18 @@ _PERIOD_MS = (0.05, 1000.0)
 
 def read_output(table: Table) -> Output | None:
     """Read the output that a device is connected to, if the table names one, and refuse other keys."""
-    number = table.whole("output", 0, _MAX_OUTPUT) if "output" in table else None
+    address = read_address(table, "output")
+    table.refuse_unknown_keys()
+    return address
+
+
+def read_address(table: Table, key: str) -> Output | None:
+    """Read the number, under a key, and the name of an output or an input of a controller, if the table has any."""
+    number = table.whole(key, 0, _MAX_OUTPUT) if key in table else None
     signal = table.text("signal") if "signal" in table else None
     if signal is not None and not _SIGNAL.fullmatch(signal):
         raise table.error("signal", f"{signal!r} cannot name a signal: a letter, then up to 31 letters, digits and _")
-    table.allow("output", "signal")
-    table.refuse_unknown_keys()
+    table.allow(key, "signal")
     return None if number is None and signal is None else Output(number=number, signal=signal)
 
 

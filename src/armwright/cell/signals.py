@@ -8,6 +8,8 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.cell.outputs import Output
+
 # A change so little behind the time that is asked for has happened [s].
 _SAME_TIME = 1e-9
 
@@ -27,6 +29,7 @@ class Input:
         delay: how much later it does so [s].
         event: the EVENT of the program whose SIGNAL switches it on; None for none.
         pulse: how long it is on then [s]; None for ever.
+        address: of the real controller; None where it is not known.
     """
 
     analogue: bool = False
@@ -36,6 +39,7 @@ class Input:
     delay: float = 0.0
     event: str | None = None
     pulse: float | None = None
+    address: Output | None = None
 
 
 @attrs.frozen(kw_only=True)

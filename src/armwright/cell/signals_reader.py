@@ -3,6 +3,7 @@
 from collections.abc import Collection
 
 from armwright.cell.entries import known_name, read_name, refuse_too_many
+from armwright.cell.outputs_reader import read_address
 from armwright.cell.signals import Changes, Input
 from armwright.files.document import Table
 
@@ -48,6 +49,7 @@ def _read_input(table: Table, devices: Collection[str] | None) -> Input:
         delay=table.number("delay_s", default=0.0, lower=0.0, upper=_MAX_TIME),
         event=event,
         pulse=table.number("pulse_s", lower=0.0, upper=_MAX_TIME) if "pulse_s" in table else None,
+        address=read_address(table, "input"),
     )
     if follows is None and "delay_s" in table:
         raise table.error("delay_s", "a delay needs the device that the input follows, `follows`")

@@ -1,8 +1,8 @@
-"""``armwright export``: write the motion of a program for a real controller."""
+"""``armwright export``: write a program, or its motion, for a real controller."""
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from typer import Argument, Option
@@ -11,7 +11,7 @@ from armwright.cli.options import Json, QuietButWarnings, usage_error
 from armwright.cli.output import print_json
 from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, load_program, print_diagnostics
 from armwright.cli.results import warn_of_stray, write_results
-from armwright.export.targets import Target
+from armwright.export.targets import Mode, Target
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -27,35 +27,47 @@ def export(  # noqa: PLR0917 - Typer reads one parameter per option
     program: ProgramFile,
     cell: CellFile = None,
     mode: Annotated[
-        Literal["plan"], Option(help="What is exported: plan, the motion of the program as it runs in the cell.")
-    ] = "plan",
+        Mode | None,
+        Option(
+            help="What is exported: program, with its control flow, which is the default where the controller has a "
+            "language that can say it; or plan, the motion of the program as it runs in the cell."
+        ),
+    ] = None,
     output: Annotated[Path | None, Option("-o", "--output", help="Folder for the files of the controller.")] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     as_json: Json = False,
     quiet: QuietButWarnings = False,
 ) -> None:
-    """Run an RLO program in a simulated cell, and write its motion for a real controller, with its proof.
+    """Run an RLO program in a simulated cell, and write it, or its motion, for a real controller, with its proof.
 
-    The checker of each language reads the written file, runs it on the model of the arm and compares targets,
-    configurations, straight lines and speeds with the plan; proof.json has what was compared and what is approximated.
-    A statement that the controller cannot repeat is rejected with its line and the reason, and nothing is written.
-    Without -o, only the proof is printed. The languages need the extra export.
+    A program is written with its loops, choices, procedures, frames and inputs; --mode plan writes what it did in the
+    cell. The checker of each language runs the written file on the model of the arm and compares targets,
+    configurations, straight lines, speeds, outputs and texts with the run; proof.json has what was compared and what
+    is approximated. A statement that the controller cannot repeat is rejected with its line and the reason, and
+    nothing is written. Without -o, only the proof is printed. The languages need the extra export.
 
     **Example:** `armwright export urscript examples/bench.rlo --cell examples/ur5_cell.toml -o out/ur5`
     """
-    from armwright.export import ExportError, export_run
+    from armwright.export import ExportError, export_compiled, export_run
+    from armwright.export.api import usual_mode
     from armwright.program.vm.interpreter import interpret
     from armwright.program.vm.machine import RunError
 
-    del mode  # there is one
     warn_of_stray(program)
     loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json)
     if loaded.cell is None:
         raise usage_error("--cell", f"missing: {program} needs a cell to run in, and IMPORTs none")
     try:
         recording = interpret(loaded.code, loaded.cell, loaded.hardware(loaded.cell))
-        exported = export_run(target, recording, program.stem)
+        if mode is None and loaded.compiled is not None:
+            mode = usual_mode(target)
+        if mode != "program":
+            exported = export_run(target, recording, program.stem)
+        elif loaded.compiled is None:
+            raise usage_error("--mode", f"program: {program} holds intermediate code, without the text of the program")
+        else:
+            exported = export_compiled(target, loaded.compiled, recording, program.stem)
     except (RunError, ExportError) as error:
         _refuse(error, loaded.code.source, as_json=as_json)
         raise typer.Exit(error.exit_status) from None
@@ -76,7 +88,8 @@ def _show(
         return
     if quiet:
         return
-    print(f"{exported.target}: {recording.duration:.6g} s of motion in {recording.cell.name}, proved:")
+    what = "the program, run for" if exported.proof.mode == "program" else "the motion of"
+    print(f"{exported.target}: {what} {recording.duration:.6g} s in {recording.cell.name}, proved:")
     for line in exported.proof.lines():
         print(f"  {line}")
     if output is not None:

@@ -1,5 +1,6 @@
 from .api import (
     ExportedProgram as ExportedProgram,
+    export_compiled as export_compiled,
     export_program as export_program,
     export_run as export_run,
 )

@@ -14,18 +14,35 @@ from armwright.export.checkers import (
     fanuc as fanuc_checker,
     krl as krl_checker,
     rapid as rapid_checker,
+    krl_machine,
+    rapid_machine,
     urscript as urscript_checker,
+    urscript_machine,
 )
 from armwright.export.checkers.actions import CheckError
+from armwright.export.checkers.cell_world import CellWorld
 from armwright.export.checkers.comparison import compare
 from armwright.export.checkers.joint_tables import compare_counts, compare_trajectory
+from armwright.export.checkers.program_comparison import compare_run
 from armwright.export.conventions import Convention
 from armwright.export.events import events_file
 from armwright.export.plan_mode import fixed_notes, plan_statements, refuse_guards
 from armwright.export.proof import Comparison, Proof
-from armwright.export.targets import Target
-from armwright.export.writers import drive_csv, fanuc, krl, rapid, ros2, urscript
-from armwright.program.api import Compilation, run
+from armwright.export.targets import Mode, Target
+from armwright.export.translation.expected import expected
+from armwright.export.translation.translate import translate_program
+from armwright.export.writers import (
+    drive_csv,
+    fanuc,
+    krl,
+    krl_program,
+    rapid,
+    rapid_program,
+    ros2,
+    urscript,
+    urscript_program,
+)
+from armwright.program.api import Compilation, compile as compile_program, run
 from armwright.program.language.source import Source
 from armwright.program.vm.recording import Recording
 
@@ -34,6 +51,12 @@ _LANGUAGES: Mapping[Target, tuple[ModuleType, ModuleType]] = {
     "krl": (krl, krl_checker),
     "rapid": (rapid, rapid_checker),
     "fanuc": (fanuc, fanuc_checker),
+}
+# Those in which a program itself can be written, and not only what it did in the cell.
+_PROGRAMS: Mapping[Target, tuple[ModuleType, ModuleType]] = {
+    "urscript": (urscript_program, urscript_machine),
+    "krl": (krl_program, krl_machine),
+    "rapid": (rapid_program, rapid_machine),
 }
 # Languages that do not say in lengths how corners are rounded.
 _WITHOUT_ZONES = ("fanuc",)
@@ -54,19 +77,31 @@ class ExportedProgram:
     proof: Proof
 
 
+def usual_mode(target: Target) -> Mode:
+    """Return what is exported where nobody says: the program, to controllers in whose language it can be written."""
+    return "program" if target in _PROGRAMS else "plan"
+
+
 def export_program(
-    target: Target, program: str | Path | Source | Compilation, cell: str | Path | Cell | None = None, *, name: str = ""
+    target: Target,
+    program: str | Path | Source | Compilation,
+    cell: str | Path | Cell | None = None,
+    *,
+    name: str = "",
+    mode: Mode | None = None,
 ) -> ExportedProgram:
-    """Run a program in its cell, and return the resulting motion for a controller.
+    """Run a program in its cell, and return it, or the resulting motion, for a controller.
 
     Args:
         target: ``ros2``, ``csv``, ``urscript``, ``krl``, ``rapid`` or ``fanuc``.
         program: the path of its file, its text as a ``Source``, or a compiled program.
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         name: of the exported program; that of the file without one.
+        mode: ``program`` for the program with its control flow, ``plan`` for what it did in the cell; ``program`` to
+            ``urscript`` and ``plan`` to all others without it.
 
     Returns:
-        The files, with their proof; every difference from the plan is within what is allowed.
+        The files, with their proof; every difference from the run is within what is allowed.
 
     Raises:
         UnknownNameError: there is no such target.
@@ -80,8 +115,43 @@ def export_program(
         ``armwright.export.export_program("rapid", "pick.rlo", "cell.toml").files``
     """
     one_of("target", target, get_args(Target))
-    recording = run(program, cell)
-    return export_run(target, recording, name or Path(recording.code.source.name).stem)
+    mode = usual_mode(target) if mode is None else mode
+    one_of("mode", mode, get_args(Mode))
+    compiled = program if isinstance(program, Compilation) else compile_program(program, cell)
+    recording = run(compiled)
+    name = name or Path(recording.code.source.name).stem
+    return export_run(target, recording, name) if mode == "plan" else export_compiled(target, compiled, recording, name)
+
+
+def export_compiled(target: Target, compiled: Compilation, recording: Recording, name: str) -> ExportedProgram:
+    """Return a program, with its control flow, for a controller; see ``export_program``.
+
+    Args:
+        target: ``urscript``.
+        compiled: the program.
+        recording: its run in the cell; the exported program is run there too, and does the same.
+        name: of the exported program.
+    """
+    one_of("target", target, _PROGRAMS)
+    if recording.failure is not None:
+        raise InvalidValueError(f"recording: the run failed: {recording.failure.diagnostic.message}")
+    writer, machine = _PROGRAMS[target]
+    code = translate_program(compiled, recording, name)
+    written = writer.write(code)
+    wanted = expected(code, recording)
+    try:
+        done = machine.run([*written.files.values()], CellWorld(recording.cell, wanted.ends))
+    except CheckError as error:
+        raise CheckFailedError(f"the exported program cannot be run: {error}") from error
+    proof = Proof(
+        target=target,
+        mode="program",
+        comparisons=compare_run(done, wanted.program),
+        approximations=written.approximations,
+        notes=code.notes,
+        sources=tuple(_source_lines(code.mapped.convention)),
+    )
+    return _proved(target, written.files, proof)
 
 
 def export_run(target: Target, recording: Recording, name: str) -> ExportedProgram:
@@ -102,6 +172,15 @@ def export_run(target: Target, recording: Recording, name: str) -> ExportedProgr
             files, proof = _tables(target, recording)
     except CheckError as error:
         raise CheckFailedError(f"the exported program cannot be read back: {error}") from error
+    return _proved(target, files, proof)
+
+
+def _proved(target: Target, files: dict[str, str], proof: Proof) -> ExportedProgram:
+    """Return files with their proof.
+
+    Raises:
+        CheckFailedError: it found too large a difference.
+    """
     proof.require()
     data = json.dumps({**proof.as_data(), "words": proof.lines()}, indent=2, ensure_ascii=False) + "\n"
     return ExportedProgram(target=target, files={**files, "proof.json": data}, proof=proof)

@@ -1,11 +1,13 @@
 """Plan mode: a program is run in its cell, and what the arm did becomes the statements of a controller."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.errors import UnsupportedArmError
@@ -34,7 +36,7 @@ _SAME_TIME = 1e-6
 _LOOKS = 65
 # Corners are rounded from no more than this part of the shorter leg on, so that two roundings never meet.
 _PART_OF_LEG = 0.4
-_SWITCHING = ("OPEN", "GRASP", "OPERATE")
+SWITCHING = ("OPEN", "GRASP", "OPERATE")
 # What takes no part in an export: it changes frames, or orders the branches of a program.
 _SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT")
 # What reads the cell while the program runs.
@@ -57,14 +59,14 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
             same time, a second arm, a device without an output, an arm without a convention.
     """
     refuse_guards(recording)
-    arm_name = _only_arm(recording)
+    arm_name = only_arm(recording)
     _refuse_parallel(recording)
     placed = recording.cell.arms[arm_name]
-    mapped = _mapped(recording, arm_name)
+    mapped = mapped_arm(recording, arm_name)
     solver = solver_of(planning_arm(placed.arm))
     statements: list[Statement] = []
     busy = 0.0
-    for begin, end, effect, stages in _events(recording):
+    for begin, end, effect, stages in run_events(recording):
         if begin > busy + 1.5 * recording.cell.period:
             # An event has been waited for.
             statements.append(Wait(span=effect.span, seconds=begin - busy))
@@ -73,8 +75,8 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
             statements += [
                 statement for stage in stages for statement in _motion(stage, recording, solver, zones=zones)
             ]
-        elif effect.kind in _SWITCHING:
-            statements += _switching(effect, recording)
+        elif effect.kind in SWITCHING:
+            statements += switching(effect, recording)
         elif effect.kind == "PAUSE":
             statements.append(Wait(span=effect.span, seconds=effect.t1 - effect.t0))
         elif effect.kind == "PRINT":
@@ -151,7 +153,7 @@ def refuse_guards(recording: Recording) -> None:
             raise refusal(source, "E611", text, effect.span, "a condition is waited for", helps=helps)
 
 
-def _only_arm(recording: Recording) -> str:
+def only_arm(recording: Recording) -> str:
     """Return the name of the arm that moved; the first of the cell where none did."""
     moved = dict.fromkeys(stage.arm for stage in recording.stages)
     if len(moved) > 1:
@@ -167,7 +169,7 @@ def _refuse_parallel(recording: Recording) -> None:
     """Refuse a run in which two things happened at the same time: their order would not be that of the run."""
     last: Effect | None = None
     busy = 0.0
-    for begin, end, effect, _ in _events(recording):
+    for begin, end, effect, _ in run_events(recording):
         if last is not None and begin < busy - _SAME_TIME:
             source = recording.code.source
             text = f"{effect.kind} begins while {last.kind} in line {source.place(last.span.start)} is under way"
@@ -177,7 +179,7 @@ def _refuse_parallel(recording: Recording) -> None:
             last, busy = effect, end
 
 
-def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
+def mapped_arm(recording: Recording, arm_name: str) -> ControllerArm:
     """Return the arm with the convention of its controller.
 
     Raises:
@@ -187,9 +189,13 @@ def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
     span = recording.stages[0].span if recording.stages else Span(0, 0)
     convention = find_convention(placed.arm, placed.controller.convention)
     if convention is None:
-        text = f"no convention says how the controller of '{placed.arm.name}' counts its joints"
-        known = ", ".join(sorted(conventions()))
-        helps = [f'name one in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; known: {known}']
+        text = f"no source that was read says how the controller of '{placed.arm.name}' counts its joints"
+        fitting = _fitting(placed.arm)
+        helps = [
+            f'name the convention in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; '
+            f"known: {', '.join(sorted(conventions()))}",
+            f"the axes of this arm can stand as those of: {', '.join(fitting) or 'none of them'}",
+        ]
         raise refusal(source, "E614", text, span, f"{arm_name} moves here", helps=helps)
     try:
         return controller_arm(placed.arm, convention)
@@ -197,10 +203,20 @@ def _mapped(recording: Recording, arm_name: str) -> ControllerArm:
         raise refusal(source, "E614", str(error), span, f"{arm_name} moves here") from None
 
 
+def _fitting(arm: Arm) -> list[str]:
+    """Return the names of the conventions as which the axes of an arm can stand."""
+    found = []
+    for name, convention in sorted(conventions().items()):
+        with suppress(UnsupportedArmError):
+            controller_arm(arm, convention)
+            found.append(name)
+    return found
+
+
 # ---- events --------------------------------------------------------------------------------------------------------
 
 
-def _events(recording: Recording) -> Iterator[_Event]:
+def run_events(recording: Recording) -> Iterator[_Event]:
     """Give what happened, in order: begin, end, effect, and the stages of a MOVE."""
     stages = {name: iter([stage for stage in recording.stages if stage.arm == name]) for name in recording.cell.arms}
     following = {name: next(ones, None) for name, ones in stages.items()}
@@ -220,10 +236,14 @@ def _belongs(stage: RunStage, effect: Effect) -> bool:
     return stage.span == effect.span and effect.t0 - _SAME_TIME <= stage.t0 <= effect.t1 + _SAME_TIME
 
 
-def _switching(effect: Effect, recording: Recording) -> list[Statement]:
+def switching(effect: Effect, recording: Recording) -> list[Statement]:
     """Return the statements of an OPEN, a GRASP or an OPERATE."""
     source = recording.code.source
     words = effect.text.split()
+    if "seconds" in effect.data or "value" in effect.data:
+        what = "PULSE switches an output by itself" if "seconds" in effect.data else "a device is set to a number"
+        helps = ["export the program by `--mode program`", "or export the motion alone by `armwright export ros2`"]
+        raise refusal(source, "E619", f"{what}, which is not written in plan mode", effect.span, "here", helps=helps)
     if effect.kind == "OPERATE":
         device, on = words[0].upper(), words[1] == "ON"
         if effect.data:
@@ -303,7 +323,7 @@ def _lines(stage: RunStage, poses: Array, blend: float | Array | None, solver: S
         stage=stage,
         poses=poses,
         q=motion(np.append(times[near], motion.duration)),
-        zones=np.zeros(len(poses)) if stops or blend is None else _zones(X[0], poses, blend),
+        zones=np.zeros(len(poses)) if stops or blend is None else blend_zones(X[0], poses, blend),
         duration=motion.duration,
         speed=float(speeds.max()),
         turn_speed=float(np.max(turns)),
@@ -311,7 +331,7 @@ def _lines(stage: RunStage, poses: Array, blend: float | Array | None, solver: S
     )
 
 
-def _zones(start: Array, poses: Sequence[Array] | Array, blend: float | Array) -> Array:
+def blend_zones(start: Array, poses: Sequence[Array] | Array, blend: float | Array) -> Array:
     """Return from where on each corner is rounded [m]: as far as is asked for, and never beyond 0.4 of a leg."""
     corners = [start, *poses]
     legs = [float(np.linalg.norm(b[:3, 3] - a[:3, 3])) for a, b in pairwise(corners)]

@@ -5,6 +5,7 @@ from typing import Any
 import attrs
 
 from armwright.errors import CheckFailedError
+from armwright.export.targets import Mode
 
 
 @attrs.frozen(kw_only=True)
@@ -46,6 +47,7 @@ class Proof:
 
     Attributes:
         target: of the export.
+        mode: what was exported: a program, or the plan of its motion.
         comparisons: all that was compared.
         approximations: what differs from the plan, in words.
         notes: what of the run is fixed in the export.
@@ -53,6 +55,7 @@ class Proof:
     """
 
     target: str
+    mode: Mode = "plan"
     comparisons: tuple[Comparison, ...]
     approximations: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -66,12 +69,15 @@ class Proof:
         """
         failed = [one.text for one in self.comparisons if not one.passed]
         if failed:
-            raise CheckFailedError(f"the exported program differs from the plan; {'; '.join(failed)}")
+            raise CheckFailedError(
+                f"the exported program differs from the {'plan' if self.mode == 'plan' else 'run'}; {'; '.join(failed)}"
+            )
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data."""
         return {
             "target": self.target,
+            "mode": self.mode,
             "comparisons": [{**attrs.asdict(one), "passed": one.passed} for one in self.comparisons],
             "approximations": list(self.approximations),
             "fixed": list(self.notes),

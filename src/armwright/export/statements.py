@@ -96,6 +96,16 @@ class SetOutput:
 
 
 @attrs.frozen(kw_only=True)
+class PulseOutput:
+    """A digital output is on for a time [s], while the program goes on."""
+
+    span: Span
+    device: str
+    output: Output
+    seconds: float
+
+
+@attrs.frozen(kw_only=True)
 class Wait:
     """Nothing happens for a time [s]."""
 
@@ -111,7 +121,7 @@ class Say:
     text: str
 
 
-Statement: TypeAlias = MoveJoints | MoveLines | MoveKnots | SetOutput | Wait | Say
+Statement: TypeAlias = MoveJoints | MoveLines | MoveKnots | SetOutput | PulseOutput | Wait | Say
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -3,3 +3,4 @@
 from typing import Literal, TypeAlias
 
 Target: TypeAlias = Literal["ros2", "csv", "urscript", "krl", "rapid", "fanuc"]
+Mode: TypeAlias = Literal["program", "plan"]

@@ -102,6 +102,7 @@ class LoadedProgram:
         imports: the files that the program imports.
         hardware: how the cell is set up to run it.
         is_code_file: whether the file holds intermediate code, and not the text of the program.
+        compiled: what became of the text; None where the file holds intermediate code.
     """
 
     code: Code
@@ -110,6 +111,7 @@ class LoadedProgram:
     imports: tuple[Path, ...] = ()
     hardware: HardwareFactory = kinematic_cell
     is_code_file: bool = False
+    compiled: Compilation | None = None
 
 
 class ProgramError(ArmwrightError, ValueError):
@@ -270,7 +272,13 @@ def load(
     if compiled.code is None:
         raise ProgramError(compiled)
     imports = imported_files(path, compiled)
-    return LoadedProgram(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
+    return LoadedProgram(
+        code=compiled.code,
+        cell=compiled.cell,
+        diagnostics=compiled.diagnostics,
+        imports=imports,
+        compiled=compiled,
+    )
 
 
 def imported_files(program: Path, compiled: Compilation) -> tuple[Path, ...]:

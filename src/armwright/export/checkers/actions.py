@@ -19,6 +19,12 @@ class JointAction:
         speed_part: part of the axis speeds of the controller, 1 for all; None where it is not said.
         passes: whether the next motion may begin before the end.
         streamed: whether it is one sample of a stream.
+        X: (4, 4) tool to be reached in the place of ``q``, seen from the base frame of the controller; of the joint
+            positions that do so, those with the words of ``configuration``, and of them the nearest ones.
+        near: (n,) to what they are nearest, as the controller counts; None for where the arm is.
+        configuration: words of the controller for a posture, by name; empty where it is free.
+        kept: names of such words that are those of where the arm is.
+        joint_speed: of the joint that has the longest way that is asked for [rad/s]; None where it is not said.
         rounding: by how much the duration may be rounded up, for the digits of the language [s].
     """
 
@@ -29,6 +35,11 @@ class JointAction:
     passes: bool = False
     streamed: bool = False
     rounding: float = 0.0
+    X: Array | None = None
+    near: Array | None = None
+    configuration: Mapping[str, int] = attrs.field(factory=dict)
+    kept: tuple[str, ...] = ()
+    joint_speed: float | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -68,6 +79,15 @@ class OutputAction:
 
 
 @attrs.frozen(kw_only=True)
+class PulseAction:
+    """A digital output, by number or name, is on for a time [s]."""
+
+    line: int
+    output: int | str
+    seconds: float
+
+
+@attrs.frozen(kw_only=True)
 class WaitAction:
     """Nothing happens for a time [s], which may be rounded up by some of it."""
 
@@ -84,7 +104,7 @@ class TextAction:
     text: str
 
 
-Action: TypeAlias = JointAction | LineAction | OutputAction | WaitAction | TextAction
+Action: TypeAlias = JointAction | LineAction | OutputAction | PulseAction | WaitAction | TextAction
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -34,6 +34,7 @@ from armwright.export.statements import (
 )
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import jacobian
+from armwright.motion.plan import StageGoal
 
 # What is allowed: micrometres of targets, of angles, of waiting times; a part of a speed limit that rounding takes.
 _PLACE_MM, _ANGLE, _TIME, _ROUNDING = 1e-3, 1e-5, 1e-4, 1e-3
@@ -51,7 +52,7 @@ _LOOKS = 17
 _Kind = TypeVar("_Kind", JointAction, LineAction, OutputAction, WaitAction, TextAction)
 
 
-class _Tally:
+class Tally:
     """One quantity, while it is compared."""
 
     def __init__(self, quantity: str, allowed: float, unit: str = "") -> None:
@@ -77,7 +78,7 @@ class _Tally:
         )
 
 
-class _Model:
+class Model:
     """The arm as its controller sees it."""
 
     def __init__(self, mapped: ControllerArm) -> None:
@@ -137,25 +138,25 @@ def compare(read: ReadProgram, program: ControllerProgram) -> tuple[Comparison, 
         read: what the checker of the target has read.
         program: the plan.
     """
-    return _Comparing(program).run(read)
+    return Comparing(program).run(read)
 
 
-class _Comparing:
+class Comparing:
     """A program of a controller, run beside its plan."""
 
     def __init__(self, program: ControllerProgram) -> None:
-        self._program, self._model = program, _Model(program.mapped)
+        self._program, self._model = program, Model(program.mapped)
         self._postures = PostureReader(program.mapped)
         self._q = np.array(program.start)
-        self.statements = _Tally("statements that differ in kind, text or order", 0)
-        self.places = _Tally("positions of targets", _PLACE_MM, "mm")
-        self.angles = _Tally("orientations of targets", _ANGLE, "rad")
-        self.joints = _Tally("joints at targets, at the ends of straight lines too", _ANGLE, "rad")
-        self.postures = _Tally("configuration words that the joints do not have", 0)
-        self.zones = _Tally("corner zones beyond the BLEND of the program, or past half a leg", _PLACE_MM, "mm")
-        self.straightness = _Tally("planned path beside lines and knots of the file, of what is allowed", 1)
-        self.speeds = _Tally("joint speeds that the file asks for, of the limits", 1 + _ROUNDING)
-        self.times = _Tally("durations", _TIME, "s")
+        self.statements = Tally("statements that differ in kind, text or order", 0)
+        self.places = Tally("positions of targets", _PLACE_MM, "mm")
+        self.angles = Tally("orientations of targets", _ANGLE, "rad")
+        self.joints = Tally("joints at targets, at the ends of straight lines too", _ANGLE, "rad")
+        self.postures = Tally("configuration words that the joints do not have", 0)
+        self.zones = Tally("corner zones beyond the BLEND of the program, or past half a leg", _PLACE_MM, "mm")
+        self.straightness = Tally("planned path beside lines and knots of the file, of what is allowed", 1)
+        self.speeds = Tally("joint speeds that the file asks for, of the limits", 1 + _ROUNDING)
+        self.times = Tally("durations", _TIME, "s")
 
     def run(self, read: ReadProgram) -> tuple[Comparison, ...]:
         """Compare all statements in order."""
@@ -170,6 +171,7 @@ class _Comparing:
             self._statement(statement, actions)
         for action in actions:
             self.statements.add(1, action.line)
+        self._end_of_program()
         tallies = (
             self.statements,
             self.places,
@@ -201,6 +203,9 @@ class _Comparing:
                     self._duration(wait.seconds, seconds, wait)
             case Say(text=text):
                 self._text(text, actions)
+
+    def _end_of_program(self) -> None:
+        """Compare what can be compared only when all has been done."""
 
     def _next(self, actions: Iterator[Action], kind: type[_Kind]) -> _Kind | None:
         """Return the next action, which is to be of a kind; None where it is none."""
@@ -272,7 +277,7 @@ class _Comparing:
             line = action.line
         self.joints.add(float(np.abs(self._q - motion(motion.duration)).max()), line)
         self.statements.add(int(zones[-1] > 0), line)
-        blends = statement.stage.stage.obstacle is None and goal is not None and goal.blend
+        blends = statement.stage.stage.obstacle is None and goal is not None and self._width(goal)
         legs = np.linalg.norm(np.diff(corners, axis=0), axis=-1)
         for leg, (before, after) in zip(legs, pairwise(zones), strict=True):
             self.zones.add(max(before - leg / 2, after - leg / 2, after - (blends or 0.0), 0.0) * 1e3, line)
@@ -281,6 +286,10 @@ class _Comparing:
         far = float(_distances(points, np.array(corners)).max())
         allowed = (statement.stage.stage.deviation or 0.0) + max(zones) + _PLACE_MM * 1e-3
         self.straightness.add(far / allowed, line)
+
+    def _width(self, goal: StageGoal) -> float | None:
+        """Return how far from a corner a controller may begin to round it [m]."""
+        return goal.blend
 
     def _end(self, action: LineAction) -> Array:
         """Return the pose (4, 4) of the tool at the end of a line, seen from the base of the arm."""

@@ -18,11 +18,18 @@ class ControllerFile:
         name: of the file.
         text: of it.
         approximations: what differs from the plan, in words.
+        others: names and texts of files that belong to it.
     """
 
     name: str
     text: str
     approximations: tuple[str, ...]
+    others: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def files(self) -> dict[str, str]:
+        """All texts by name, its own first."""
+        return {self.name: self.text, **dict(self.others)}
 
 
 def heading(program: ControllerProgram) -> str:

@@ -24,16 +24,16 @@ from armwright.export.writers.text import decimal, decimals, identifier, plain_l
 
 # Digits behind the point: 10 nm and 0.2 µrad.
 _DIGITS = 5
-_NAME_LIMIT = 24
+NAME_LIMIT = 24
 # The slowest that motions are written with: part of the axis speed [%], [m/s] and [m/s²], [deg/s]. Of lines without a
 # turn the ends differ by rounding, which must not take longer than the line.
-_LEAST_PERCENT, _LEAST, _LEAST_TURN = 0.1, 1e-4, 0.1
+LEAST_PERCENT, LEAST_RATE, LEAST_TURN = 0.1, 1e-4, 0.1
 # How near knots are passed, as a part of the ways between them [%].
 _KNOT_ZONE = 50
 # How fast the arm comes to where the program begins, from wherever it is [%].
-_TO_START = 10
+TO_START = 10
 # What would end a text.
-_REPLACED = '"'
+REPLACED = '"'
 
 
 def write(program: ControllerProgram) -> ControllerFile:
@@ -42,12 +42,12 @@ def write(program: ControllerProgram) -> ControllerFile:
     Raises:
         ExportError: it has an output without a number.
     """
-    name = identifier(program.name, _NAME_LIMIT, KRL)
+    name = identifier(program.name, NAME_LIMIT, KRL)
     tool = program.mapped.X_CT
     lines = ["&ACCESS RVP", f"DEF {name}( )", f"; {heading(program)}", "BAS(#INITMOV,0)", "$BASE=$NULLFRAME"]
-    lines += [f"$TOOL={{{_frame(tool)}}}", "$IPO_MODE=#BASE"]
-    lines += [f"BAS(#VEL_PTP,{_TO_START})", f"PTP {{{_axes(program.mapped.joints(program.start))}}}"]
-    said = {"BAS(#VEL_PTP,": str(_TO_START)}
+    lines += [f"$TOOL={{{frame_text(tool)}}}", "$IPO_MODE=#BASE"]
+    lines += [f"BAS(#VEL_PTP,{TO_START})", f"PTP {{{axes_text(program.mapped.joints(program.start))}}}"]
+    said = {"BAS(#VEL_PTP,": str(TO_START)}
     ends = iter(postures(program.mapped, program.straight_ends()))
     for statement in program.statements:
         lines += _lines(statement, program, said, ends)
@@ -70,15 +70,15 @@ def _lines(
     """
     match statement:
         case MoveJoints(q=q, speed_part=part):
-            yield from _settings(said, {"BAS(#VEL_PTP,": _percent(part)})
-            yield f"PTP {{{_axes(program.mapped.joints(q))}}}"
+            yield from _settings(said, {"BAS(#VEL_PTP,": percent_text(part)})
+            yield f"PTP {{{axes_text(program.mapped.joints(q))}}}"
         case MoveLines():
             yield from _straight(statement, program, said, ends)
         case MoveKnots(q=q, speed_part=part):
-            yield from _settings(said, {"BAS(#VEL_PTP,": _percent(part), "$APO.CPTP=": str(_KNOT_ZONE)})
+            yield from _settings(said, {"BAS(#VEL_PTP,": percent_text(part), "$APO.CPTP=": str(_KNOT_ZONE)})
             shown = program.mapped.joints(q)
-            yield from (f"PTP {{{_axes(knot)}}} C_PTP" for knot in shown[:-1])
-            yield f"PTP {{{_axes(shown[-1])}}}"
+            yield from (f"PTP {{{axes_text(knot)}}} C_PTP" for knot in shown[:-1])
+            yield f"PTP {{{axes_text(shown[-1])}}}"
         case SetOutput(output=output, on=on, device=device):
             if not output.number:
                 text = f"the cell file gives the output of {device} no number, or 0, and KRL counts outputs from 1"
@@ -88,7 +88,7 @@ def _lines(
         case Wait(seconds=seconds):
             yield f"WAIT SEC {decimal(seconds, 4)}"
         case Say(text=text):
-            for line in plain_lines(text, _REPLACED):
+            for line in plain_lines(text, REPLACED):
                 yield "WAIT FOR StrClear($LOOP_MSG[])"
                 yield "$LOOP_CONT=TRUE"
                 yield f'$LOOP_MSG[]="{line}"'
@@ -97,8 +97,8 @@ def _lines(
 def _straight(
     statement: MoveLines, program: ControllerProgram, said: dict[str, str], ends: Iterator[Posture]
 ) -> Iterator[str]:
-    speed, acceleration = (decimal(max(x, _LEAST), 5) for x in (statement.speed, statement.acceleration))
-    turn = decimal(max(float(np.degrees(statement.turn_speed)), _LEAST_TURN), 5)
+    speed, acceleration = (decimal(max(x, LEAST_RATE), 5) for x in (statement.speed, statement.acceleration))
+    turn = decimal(max(float(np.degrees(statement.turn_speed)), LEAST_TURN), 5)
     wanted = {"$VEL.CP=": speed, "$VEL.ORI1=": turn, "$VEL.ORI2=": turn, "$ACC.CP=": acceleration}
     yield from _settings(said, wanted)
     poses = program.mapped.pose(statement.poses)
@@ -106,7 +106,7 @@ def _straight(
         status, turns = status_and_turn(next(ends))
         if zone:
             yield from _settings(said, {"$APO.CDIS=": decimal(zone * 1e3, 3)})
-        yield f"LIN {{{_frame(pose)},S {status},T {turns}}}{' C_DIS' if zone else ''}"
+        yield f"LIN {{{frame_text(pose)},S {status},T {turns}}}{' C_DIS' if zone else ''}"
 
 
 def _settings(said: dict[str, str], wanted: dict[str, str]) -> Iterator[str]:
@@ -117,16 +117,19 @@ def _settings(said: dict[str, str], wanted: dict[str, str]) -> Iterator[str]:
             yield f"{what}{value}{')' if what.startswith('BAS(') else ''}"
 
 
-def _percent(part: float) -> str:
-    return decimal(min(max(part * 100.0, _LEAST_PERCENT), 100.0), 3)
+def percent_text(part: float) -> str:
+    """Return a part of the axis speeds [%]."""
+    return decimal(min(max(part * 100.0, LEAST_PERCENT), 100.0), 3)
 
 
-def _axes(q: Iterable[float]) -> str:
+def axes_text(q: Iterable[float]) -> str:
+    """Return joint positions (6,) as the controller counts them, as the fields of AXIS."""
     angles = decimals(np.degrees(np.asarray(q)), _DIGITS)
     return ",".join(f"A{i} {angle}" for i, angle in enumerate(angles, 1))
 
 
-def _frame(X: Array) -> str:
+def frame_text(X: Array) -> str:
+    """Return a pose (4, 4) as the fields of FRAME."""
     numbers = decimals([*(X[:3, 3] * 1e3), *zyx_angles(X[:3, :3])], _DIGITS)
     return ",".join(f"{name} {number}" for name, number in zip("XYZABC", numbers, strict=True))
 
@@ -134,6 +137,6 @@ def _frame(X: Array) -> str:
 def _approximations(program: ControllerProgram) -> Iterator[str]:
     yield "the load of the tool is that of the controller: the program does not set it"
     yield "the axis speeds of the controller at 100 % are taken to be the speed limits of the arm"
-    yield from common_approximations(program, _REPLACED)
+    yield from common_approximations(program, REPLACED)
     if any(isinstance(one, MoveKnots) for one in program.statements):
         yield "timing and shape between knots: they are passed with C_PTP, at the speed of the controller"

@@ -24,13 +24,13 @@ from armwright.export.writers.text import decimal, decimals, identifier, plain_l
 
 # Digits behind the point: 0.1 µm, of angles 2 µrad to 0.2 µrad, of quaternions 10 nrad.
 _LENGTH_DIGITS, _ANGLE_DIGITS, _QUATERNION_DIGITS = 4, 5, 8
-_NAME_LIMIT = 32
-_NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-_TOOL = "tool_1"
+NAME_LIMIT = 32
+NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+TOOL = "tool_1"
 # Of speeds: that of external axes [mm/s], [deg/s]; the slowest of the tool [mm/s], [deg/s].
-_EXTERNAL, _LEAST = "5000,1000", 1e-2
+EXTERNAL, LEAST_SPEED = "5000,1000", 1e-2
 # Where the duration is given, and on the way to where the program begins, from wherever the arm is.
-_TIMED, _SLOW = "v1000", "v50"
+_TIMED, SLOW = "v1000", "v50"
 
 
 def write(program: ControllerProgram) -> ControllerFile:
@@ -39,14 +39,14 @@ def write(program: ControllerProgram) -> ControllerFile:
     Raises:
         ExportError: it has an output without a name.
     """
-    name = identifier(program.name, _NAME_LIMIT, RAPID)
+    name = identifier(program.name, NAME_LIMIT, RAPID)
     lines = [
         f"MODULE {name}",
         f"  ! {heading(program)}",
-        f"  PERS tooldata {_TOOL}:=[TRUE,[{_frame(program.mapped.X_CT)}],[1,[0,0,1],[1,0,0,0],0,0,0]];",
+        f"  PERS tooldata {TOOL}:=[TRUE,[{frame_text(program.mapped.X_CT)}],[1,[0,0,1],[1,0,0,0],0,0,0]];",
         "  PROC main()",
         "    ConfL\\Off;",
-        f"    {_absolute(program.mapped.joints(program.start), _SLOW, 'fine')};",
+        f"    {absolute(program.mapped.joints(program.start), SLOW, 'fine')};",
     ]
     ends = iter(postures(program.mapped, program.straight_ends()))
     for statement in program.statements:
@@ -61,13 +61,13 @@ def _lines(statement: Statement, program: ControllerProgram, ends: Iterator[Post
     """Give the instructions of a statement; ``ends`` are the postures at the ends of all lines still to be written."""
     match statement:
         case MoveJoints(q=q, duration=duration):
-            yield _absolute(program.mapped.joints(q), _within(duration), "fine")
+            yield absolute(program.mapped.joints(q), within(duration), "fine")
         case MoveLines():
             yield from _straight(statement, program, ends)
         case MoveKnots(q=q, times=times):
             shown, parts = program.mapped.joints(q), np.diff(times, prepend=0.0)
             for i, (knot, part) in enumerate(zip(shown, parts, strict=True), 1):
-                yield _absolute(knot, _within(float(part)), "fine" if i == len(shown) else "z1")
+                yield absolute(knot, within(float(part)), "fine" if i == len(shown) else "z1")
         case SetOutput(output=output, on=on, device=device):
             if output.signal is None:
                 text = f"the cell file gives the output of {device} a number, and RAPID knows signals by names"
@@ -82,27 +82,28 @@ def _lines(statement: Statement, program: ControllerProgram, ends: Iterator[Post
                 yield f'TPWrite "{escaped}"'
 
 
-def _absolute(q: Array, speed: str, zone: str) -> str:
+def absolute(q: Array, speed: str, zone: str) -> str:
+    """Return a motion to joint positions (6,) as the controller counts them [rad]."""
     angles = ",".join(decimals(np.degrees(q), _ANGLE_DIGITS))
-    return f"MoveAbsJ [[{angles}],{_NO_AXES}],{speed},{zone},{_TOOL}"
+    return f"MoveAbsJ [[{angles}],{NO_AXES}],{speed},{zone},{TOOL}"
 
 
-def _within(duration: float) -> str:
+def within(duration: float) -> str:
     """Return the speed of a motion that is to take a time [s]."""
     return f"{_TIMED}\\T:={decimal(duration, 4)}"
 
 
 def _straight(statement: MoveLines, program: ControllerProgram, ends: Iterator[Posture]) -> Iterator[str]:
     poses = program.mapped.pose(statement.poses)
-    speed = [max(statement.speed * 1e3, _LEAST), max(float(np.degrees(statement.turn_speed)), _LEAST)]
+    speed = [max(statement.speed * 1e3, LEAST_SPEED), max(float(np.degrees(statement.turn_speed)), LEAST_SPEED)]
     for pose, zone in zip(poses, statement.zones, strict=True):
         configuration = ",".join(map(str, confdata(next(ends))))
-        target = f"[{_frame(pose)},[{configuration}],{_NO_AXES}]"
-        how = _within(statement.duration) if len(poses) == 1 else f"[{','.join(decimals(speed, 3))},{_EXTERNAL}]"
-        yield f"MoveL {target},{how},{_zone(zone)},{_TOOL}\\WObj:=wobj0"
+        target = f"[{frame_text(pose)},[{configuration}],{NO_AXES}]"
+        how = within(statement.duration) if len(poses) == 1 else f"[{','.join(decimals(speed, 3))},{EXTERNAL}]"
+        yield f"MoveL {target},{how},{zone_text(zone)},{TOOL}\\WObj:=wobj0"
 
 
-def _zone(distance: float) -> str:
+def zone_text(distance: float) -> str:
     """Return a corner zone: the tool point leaves its line no farther from the corner than a distance [m]."""
     if not distance:
         return "fine"
@@ -110,7 +111,8 @@ def _zone(distance: float) -> str:
     return f"[FALSE,{path},{path},{path},10,{path},10]"
 
 
-def _frame(X: Array) -> str:
+def frame_text(X: Array) -> str:
+    """Return place and orientation of a pose (4, 4)."""
     position = ",".join(decimals(X[:3, 3] * 1e3, _LENGTH_DIGITS))
     return f"[{position}],[{_numbers(quaternion(X[:3, :3]))}]"
 

@@ -26,14 +26,14 @@ from armwright.export.writers.text import decimal, decimals, identifier, plain_l
 _DIGITS = 7
 # Controllers become unstable with more lines in one program.
 MOST_LINES = 15_000
-_NAME_LIMIT = 64
+NAME_LIMIT = 64
 # The slowest that a line is written with [m/s], [m/s²].
-_LEAST = 1e-4
+LEAST_SPEED = 1e-4
 _STREAM_PERIOD = 0.008
 # How the arm comes to where the program begins, from wherever it is [rad/s], [rad/s²].
-_TO_START = 0.2
+TO_START = 0.2
 # What would end a text, or change the meaning of what follows.
-_REPLACED = '"\\'
+REPLACED = '"\\'
 
 
 def write(program: ControllerProgram) -> ControllerFile:
@@ -42,9 +42,9 @@ def write(program: ControllerProgram) -> ControllerFile:
     Raises:
         ExportError: it has more lines than controllers bear, or an output without a number.
     """
-    name = identifier(program.name, _NAME_LIMIT, URSCRIPT)
-    lines = [f"# {heading(program)}", f"def {name}():", f"  set_tcp({_pose(program.mapped.X_CT)})"]
-    lines.append(f"  movej({_joints(program.mapped.joints(program.start))}, a={_TO_START}, v={_TO_START})")
+    name = identifier(program.name, NAME_LIMIT, URSCRIPT)
+    lines = [f"# {heading(program)}", f"def {name}():", f"  set_tcp({pose_text(program.mapped.X_CT)})"]
+    lines.append(f"  movej({joints_text(program.mapped.joints(program.start))}, a={TO_START}, v={TO_START})")
     for statement in program.statements:
         lines += [f"  {line}" for line in _lines(statement, program)]
         if len(lines) > MOST_LINES:
@@ -60,7 +60,7 @@ def write(program: ControllerProgram) -> ControllerFile:
 def _lines(statement: Statement, program: ControllerProgram) -> Iterator[str]:
     match statement:
         case MoveJoints(q=q, duration=duration):
-            yield f"movej({_joints(program.mapped.joints(q))}, t={decimal(duration, 4)})"
+            yield f"movej({joints_text(program.mapped.joints(q))}, t={decimal(duration, 4)})"
         case MoveLines():
             yield from _straight(statement, program)
         case MoveKnots(stage=stage):
@@ -69,7 +69,7 @@ def _lines(statement: Statement, program: ControllerProgram) -> Iterator[str]:
             positions = program.mapped.joints(stage.motion(np.linspace(0.0, stage.motion.duration, count + 1)[1:]))
             following = f"t={period:g}, lookahead_time=0.03, gain=500)"
             for q in positions:
-                yield f"servoj({_joints(q)}, 0, 0, {following}"
+                yield f"servoj({joints_text(q)}, 0, 0, {following}"
             yield "stopj(4.0)"
         case SetOutput(output=output, on=on, device=device):
             if output.number is None:
@@ -80,31 +80,33 @@ def _lines(statement: Statement, program: ControllerProgram) -> Iterator[str]:
         case Wait(seconds=seconds):
             yield f"sleep({decimal(seconds, 4)})"
         case Say(text=text):
-            for line in plain_lines(text, _REPLACED):
+            for line in plain_lines(text, REPLACED):
                 yield f'textmsg("{line}")'
 
 
 def _straight(statement: MoveLines, program: ControllerProgram) -> Iterator[str]:
     poses = program.mapped.pose(statement.poses)
     if len(poses) == 1:
-        yield f"movel({_pose(poses[0])}, t={decimal(statement.duration, 4)})"
+        yield f"movel({pose_text(poses[0])}, t={decimal(statement.duration, 4)})"
         return
-    speed, acceleration = (max(x, _LEAST) for x in (statement.speed, statement.acceleration))
+    speed, acceleration = (max(x, LEAST_SPEED) for x in (statement.speed, statement.acceleration))
     for pose, zone in zip(poses, statement.zones, strict=True):
         radius = f", r={decimal(zone, 5)}" if zone else ""
-        yield f"movel({_pose(pose)}, a={decimal(acceleration, 4)}, v={decimal(speed, 4)}{radius})"
+        yield f"movel({pose_text(pose)}, a={decimal(acceleration, 4)}, v={decimal(speed, 4)}{radius})"
 
 
-def _joints(q: Iterable[float]) -> str:
+def joints_text(q: Iterable[float]) -> str:
+    """Return joint positions (6,) as the controller counts them [rad]."""
     return f"[{', '.join(decimals(q, _DIGITS))}]"
 
 
-def _pose(X: Array) -> str:
+def pose_text(X: Array) -> str:
+    """Return a pose (4, 4)."""
     return f"p[{', '.join(decimals([*X[:3, 3], *rotation_vector(X[:3, :3])], _DIGITS))}]"
 
 
 def _approximations(program: ControllerProgram) -> Iterator[str]:
     yield "the load of the tool is that of the installation: the program does not set it"
-    yield from common_approximations(program, _REPLACED)
+    yield from common_approximations(program, REPLACED)
     if any(isinstance(one, MoveKnots) for one in program.statements):
         yield "streamed stages take up to one period of the stream longer than the plan"

@@ -6,7 +6,7 @@ program is checked against, and so do ``frames``, ``devices``, ``visions``, ``in
 grip ; END.`` has the text of a module. ``// run in one_arm`` has the program run in a cell that comes with the pages,
 with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command line; ``// effort: 60 in joint
 2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported afterwards, by
-``armwright.export``.
+``armwright.export``, and ``// export urscript program`` the program.
 """
 
 import re
@@ -20,7 +20,7 @@ from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
 from armwright.physics.kinematic_cell import kinematic_cell
-from armwright.program.api import compile as translate, run
+from armwright.program.api import Compilation, compile as translate, run
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
@@ -43,14 +43,14 @@ _OLD = re.compile(r"^// std=83$", re.MULTILINE)
 _STRICT = re.compile(r"^// strict$", re.MULTILINE)
 
 
-def run_example(source: Source) -> tuple[tuple[Diagnostic, ...], Recording | None]:
+def run_example(source: Source) -> tuple[tuple[Diagnostic, ...], Compilation, Recording | None]:
     """Return what is said of a program, by the translator and, where its comments have it run, on the way.
 
     Args:
         source: the program, with its comments.
 
     Returns:
-        The diagnostics, and the run; None where there is none, or it did not come to its end.
+        The diagnostics, the compiled program, and the run; None where there is none, or it did not come to its end.
     """
     cell = _run_cell(source.text)
     compiled = translate(
@@ -61,13 +61,13 @@ def run_example(source: Source) -> tuple[tuple[Diagnostic, ...], Recording | Non
         read_import=_import_reader(source.text),
     )
     if cell is None or compiled.code is None:
-        return compiled.diagnostics, None
+        return compiled.diagnostics, compiled, None
     limits = Limits(**{quantity: int(count) for quantity, count in _LIMIT.findall(source.text)})
     try:
         recording = run(compiled, limits=limits, hardware=_hardware(source.text))
     except RunError as error:
-        return (*compiled.diagnostics, error.diagnostic), None
-    return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell)), recording
+        return (*compiled.diagnostics, error.diagnostic), compiled, None
+    return (*compiled.diagnostics, *motion_warnings(recording.stages, recording.cell)), compiled, recording
 
 
 def _run_cell(text: str) -> Cell | None:
