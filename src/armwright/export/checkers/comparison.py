@@ -277,18 +277,19 @@ class Comparing:
             line = action.line
         self.joints.add(float(np.abs(self._q - motion(motion.duration)).max()), line)
         self.statements.add(int(zones[-1] > 0), line)
-        blends = statement.stage.stage.obstacle is None and goal is not None and self._width(goal)
+        blend = self._width(goal) if statement.stage.stage.obstacle is None and goal is not None else None
+        allowed_zones = [*np.broadcast_to(0.0 if blend is None else blend, len(poses) - 1).tolist(), 0.0]
         legs = np.linalg.norm(np.diff(corners, axis=0), axis=-1)
-        for leg, (before, after) in zip(legs, pairwise(zones), strict=True):
-            self.zones.add(max(before - leg / 2, after - leg / 2, after - (blends or 0.0), 0.0) * 1e3, line)
+        for leg, (before, after), most in zip(legs, pairwise(zones), allowed_zones, strict=True):
+            self.zones.add(max(before - leg / 2, after - leg / 2, after - most, 0.0) * 1e3, line)
         # The planned path is where the straight lines of the file are, but for what was certified and for corners.
         points = self._model.pose(motion(np.linspace(0.0, motion.duration, _LOOKS)))[:, :3, 3]
         far = float(_distances(points, np.array(corners)).max())
         allowed = (statement.stage.stage.deviation or 0.0) + max(zones) + _PLACE_MM * 1e-3
         self.straightness.add(far / allowed, line)
 
-    def _width(self, goal: StageGoal) -> float | None:
-        """Return how far from a corner a controller may begin to round it [m]."""
+    def _width(self, goal: StageGoal) -> float | Array | None:
+        """Return how far from each corner a controller may begin to round it [m]."""
         return goal.blend
 
     def _end(self, action: LineAction) -> Array:

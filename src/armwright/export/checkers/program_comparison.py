@@ -110,7 +110,7 @@ class _ComparingRun(Comparing):
         for line, wrong in self._wrong.items():
             self.postures.add(wrong, line)
 
-    def _width(self, goal: StageGoal) -> float | None:
+    def _width(self, goal: StageGoal) -> float | Array | None:
         return goal.blend if goal.blend is not None else goal.corner
 
     def _text(self, text: str, actions: Iterator[Action]) -> None:
