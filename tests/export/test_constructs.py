@@ -96,7 +96,8 @@ hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0.40, 3.00, 0.25]
 encoders = {{ counts = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6] }}
 """
     dimmer = '\nHORN = {}\nDIMMER = { analogue = true, output = 5, signal = "aoDimmer" }'
-    text = text.replace("[devices]", f"{second}\n[devices]{dimmer}") + "\n[inputs]\nDOOR = {}\n"
+    text = text.replace("[devices]", f"{second}\n[devices]{dimmer}")
+    text = text.replace("[inputs]", "[inputs]\nDOOR = {}") if "[inputs]" in text else f"{text}\n[inputs]\nDOOR = {{}}\n"
     return text.replace("[visions]", "[visions]\nC = [[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.42,-0.10, 0.20]]")
 
 
