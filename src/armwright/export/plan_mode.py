@@ -240,15 +240,11 @@ def switching(effect: Effect, recording: Recording) -> list[Statement]:
     """Return the statements of an OPEN, a GRASP or an OPERATE."""
     source = recording.code.source
     words = effect.text.split()
-    if "seconds" in effect.data or "value" in effect.data:
-        what = "PULSE switches an output by itself" if "seconds" in effect.data else "a device is set to a number"
-        helps = ["export the program by `--mode program`", "or export the motion alone by `armwright export ros2`"]
-        raise refusal(source, "E619", f"{what}, which is not written in plan mode", effect.span, "here", helps=helps)
     if effect.kind == "OPERATE":
         device, on = words[0].upper(), words[1] == "ON"
         if effect.data:
             text = f"an output switches {device} on or off, and cannot {_beyond_switching(effect)}"
-            helps = [f"write `OPERATE {device} ON` and `OPERATE {device} OFF`"]
+            helps = [f"write `OPERATE {device} ON` and `OPERATE {device} OFF`", "or export it by `--mode program`"]
             raise refusal(source, "E616", text, effect.span, "more than a switch is asked for", helps=helps)
     else:
         device, on = str(effect.arm), effect.kind == "GRASP"
