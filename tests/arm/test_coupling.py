@@ -199,6 +199,22 @@ def test_branches_beyond_limits_of_drives() -> None:
     np.testing.assert_allclose(sorted(b.q.tolist() for b in limited.branches if b.allowed), sorted(map(list, inside)))
 
 
+def test_a_whole_turn_that_a_drive_asks_for() -> None:
+    """Of the turns that the limits of the last joint leave, the one is taken in which no drive passes its limits."""
+    arm, C = load_arm("puma560"), np.eye(6)
+    C[5, 4] = -1.0
+    limits = [*[Limits()] * 5, Limits(lower=-3.5, upper=3.5)]
+    coupled = attrs.evolve(arm, coupling=Coupling(matrix=C, limits=limits))
+    q = np.array([-1.7, 0.1, 1.9, 0.4, 1.4, -3.8])
+
+    solution = inverse(coupled, forward(coupled, q), near=[0, 0, 0, 0, 0, 3.0])
+
+    assert not any(violations(coupled, branch.q) for branch in solution.allowed)
+    assert min(np.abs(branch.q - q).max() for branch in solution.allowed) < 1e-9
+    freely = inverse(arm, forward(arm, q), near=[0, 0, 0, 0, 0, 3.0])
+    assert min(np.abs(branch.q - q).max() for branch in freely.allowed) > 1.0
+
+
 def test_urdf_names_what_it_loses(belt: Arm, tmp_path: Path) -> None:
     """In URDF joints of coupled drives have no friction, since it is none of theirs; what is lost is said."""
     path = tmp_path / "belt.urdf"

@@ -205,6 +205,22 @@ def test_sixteen_real_configurations() -> None:
     assert most == 16
 
 
+def test_configurations_beside_a_wrist_that_is_nearly_spherical() -> None:
+    """With axes that miss one another by 0.4 mm some configurations exist only beside a straight wrist, within 1e-3."""
+    arm = load_arm("gen3-6dof")
+    q = np.radians([120.0, -90.0, -90.0, 120.0, 180.0, -180.0])
+
+    solution = inverse(arm, forward(arm, q))
+
+    found = np.array([branch.q for branch in solution])
+    assert len(found) == 12
+    assert max(max(branch.position_error, branch.rotation_error) for branch in solution) < RESIDUAL
+    beside = [(120, -90, -90, 120, 180, -180), (119.95, -90, -90, 60.28, 180, 120.23)]
+    beside += [(-59.72, 90, 90, -60.28, 180, 180), (-59.77, 90, 90, -120, 180, 120.23)]
+    for each in np.radians(beside):
+        assert _turned_apart(arm, found, each).min() < 1e-4
+
+
 @pytest.mark.parametrize("name", ["last parallel, 3 more", "three parallel, 2 more", "backwards"])
 def test_against_eaik(name: str, rng: np.random.Generator) -> None:
     """EAIK knows spherical ends and three parallel axes too: as many configurations, the same ones."""

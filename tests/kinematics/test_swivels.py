@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.model import Arm, Limits
 from armwright.errors import InvalidValueError, KindError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward, link_poses
@@ -78,6 +79,32 @@ def test_intervals_are_the_swivels_within_the_limits(make: Callable[[], Arm], sa
             assert allowed == inside
             tried += 8
     sample.record(f"swivels of {make.__name__} in and out of intervals", tried, 0)
+
+
+@pytest.mark.share(0.2)
+def test_intervals_are_the_swivels_within_the_limits_of_drives(sample: Sample) -> None:
+    """Of an arm with a geared wrist, whose last drive has limits: inside an interval it keeps them, outside not."""
+    arm, C = iiwa14(), np.eye(7)
+    C[6, 5] = -1.0
+    drive = Limits(lower=-0.6, upper=0.8)
+    arm = attrs.evolve(arm, coupling=Coupling(matrix=C, limits=[*[Limits()] * 6, drive]))
+    for rng in sample.cases(20):
+        q = random_configurations(arm, rng, 1)[0]
+        q[6] = rng.uniform(drive.lower, drive.upper) - q[5]
+        if abs(q[6]) > arm.limits.upper[6]:
+            continue
+        X = forward(arm, q)
+
+        intervals = swivel_intervals(arm, X, q)
+
+        here = float(swivel_of(arm, q))
+        assert any(one.lower - 1e-6 <= here <= one.upper + 1e-6 for one in intervals)
+        for word in ("nearest", "middle", "farthest"):
+            assert inverse(arm, X, q, swivel=word).allowed
+        for swivel in rng.uniform(-np.pi, np.pi, size=10):
+            if min(abs(swivel - end) for one in intervals for end in (one.lower, one.upper)) > 1e-3:
+                inside = {one.label for one in intervals if one.lower <= swivel <= one.upper}
+                assert {branch.label for branch in inverse(arm, X, q, swivel=swivel).allowed} == inside
 
 
 @pytest.mark.parametrize("make", ARMS)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.kinematics.inverse_kinematics.axes import are_parallel, are_perpendicular, joint_axes
+from armwright.kinematics.inverse_kinematics.axes import SAME, are_parallel, are_perpendicular, joint_axes
 from armwright.kinematics.inverse_kinematics.decompositions import label_of, stance
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse, ranked, search_from
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution
@@ -32,8 +32,9 @@ from armwright.spatial.rotations import rotation_vector
 
 Complex: TypeAlias = NDArray[np.complex128]
 
-# Configurations at random whose paths to the first pose begin to find all that it has.
-_SEEDS = 48
+# Configurations at random whose paths to the first pose begin to find all that it has, and as many near singular ones,
+# down to the fifth power of ten: with a wrist that is nearly spherical, some are far from all others [rad].
+_SEEDS, _NEAREST = 48, 5.0
 # Loops that bring nothing new before the configurations are said to be all, and loops at most.
 _IDLE_LOOPS, _LOOPS = 6, 60
 # Complex joint positions closer than this are one [rad], in parts of the length of the arm for slides.
@@ -165,6 +166,7 @@ def _fibre(arm: Arm) -> _Fibre:
     shape = (_SEEDS, arm.n)
     q = rng.uniform(-math.pi, math.pi, size=shape) + 0.4j * rng.normal(size=shape)
     q = np.where(chain.revolute, q, 0.5 * _complex(rng, *shape))
+    q = np.concatenate([q, _near_singular(arm, q.real, rng)])
     here, there = _Pose(_complex(rng, 4), _complex(rng, 4)), _Pose(*rng.normal(size=(2, 4)).astype(np.complex128))
     q, arrived = _followed(chain, q, _poses(chain.displacements(q)[0]), here)
     q = _distinct(chain, q[arrived])
@@ -180,6 +182,24 @@ def _fibre(arm: Arm) -> _Fibre:
         if idle == _IDLE_LOOPS:
             break
     return _Fibre(chain, here, q, tuple(_complex(rng, 2) for _ in range(_WAYS)))
+
+
+def _near_singular(arm: Arm, q: Array, rng: np.random.Generator) -> Complex:
+    """Return configurations (k, n) with one joint moved so that the axes before and behind it are in one plane with it.
+
+    They are off by random complex parts of many sizes. Joints take their turns; those beside parallel axes, and slides,
+    do not.
+    """
+    w, q = joint_axes(arm).directions, q.copy()
+    level = {}
+    for i in range(1, arm.n - 1):
+        before, behind = (v - w[i] * (v @ w[i]) for v in (w[i - 1], w[i + 1]))
+        if arm.revolute[i] and min(np.linalg.norm(before), np.linalg.norm(behind)) > SAME:
+            level[i] = math.atan2(w[i] @ np.cross(behind, before), behind @ before)
+    for k, row in enumerate(q if level else ()):
+        joint = list(level)[k % len(level)]
+        row[joint] = level[joint] + math.pi * rng.integers(2)
+    return np.asarray(q + 10.0 ** -rng.uniform(1.0, _NEAREST, size=(len(q), 1)) * _complex(rng, *q.shape))
 
 
 def _chain(arm: Arm) -> _Chain:

@@ -85,9 +85,9 @@ def swivel_intervals(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
     """Return the swivels at which an arm of seven joints can hold a pose within its joint limits.
 
     With a spherical shoulder and a spherical wrist the ends of the intervals are known in closed form: at each a joint
-    is at a limit, or shoulder or wrist are straight. Of other arms they are found by looking at 720 steps of the
-    joint that is held, and between the steps where a branch comes near its limits; intervals narrower than about a
-    thousandth of a step may be missed.
+    is at a limit, or shoulder or wrist are straight. Of other arms, and of arms whose coupled drives have limits, they
+    are found by looking at 720 steps of the swivel, and between the steps where a branch comes near its limits;
+    intervals narrower than about a thousandth of a step may be missed, and one that goes on past 180 deg is two.
 
     Args:
         arm: an arm of seven joints with a closed form: see ``find_closed_form``.
@@ -215,7 +215,9 @@ class _Family:
 
     def intervals(self) -> list[_Interval]:
         """Return the values of the parameter at which branches are inside the limits, branch by branch."""
-        return self._between_limits() if isinstance(self.form, Swivelling) else self._looked_for()
+        # Where a drive that moves several joints is at a limit, is no linear equation.
+        linear = self.arm.coupling is None or not self.arm.coupling.limits
+        return self._between_limits() if linear and isinstance(self.form, Swivelling) else self._looked_for()
 
     def chosen(self, choice: str, here: float) -> list[tuple[int, float]]:
         """Return one value of the parameter for each branch that has one inside the limits: (branch, value).
@@ -325,16 +327,11 @@ class _Family:
         for x in ends[2]:
             yield from _angles([float(h[0] @ A @ _turned(h[2], -x, h[1])) for A in parts], float(h[0] @ h[1]))
 
-    # ---- intervals looked for, of a joint that is held ------------------------------------------------------------
+    # ---- intervals looked for, of a joint that is held, or of coupled drives --------------------------------------
 
     def _looked_for(self) -> list[_Interval]:
         """Return the intervals that steps of the parameter show, and those that lie between two steps."""
-        assert isinstance(self.form, Locked)  # noqa: S101 - the only other kind
-        limits = self.arm.joints[self.form.joint - 1].limits
-        reach = math.pi if self.form.kind == "R" else _ENDLESS
-        here = float(self.near[self.form.joint - 1])
-        lower = limits.lower if math.isfinite(limits.lower) else min(here, limits.upper) - reach
-        upper = limits.upper if math.isfinite(limits.upper) else max(here, limits.lower) + reach
+        lower, upper = self._range()
         every = np.arange(len(self.form.signs))
         steps, width = np.linspace(lower, upper, _LOOKED_AT, retstep=True)
         at_steps = self.missing(every, np.broadcast_to(steps, (len(every), _LOOKED_AT)))
@@ -355,6 +352,17 @@ class _Family:
                 missing[branch] = np.concatenate([missing[branch], found[rows].ravel()])[first]
             width /= _FINER
         return self._ends(values, missing)
+
+    def _range(self) -> tuple[float, float]:
+        """Return between what the parameter is looked at."""
+        if not isinstance(self.form, Locked):
+            return -math.pi, math.pi
+        limits = self.arm.joints[self.form.joint - 1].limits
+        reach = math.pi if self.form.kind == "R" else _ENDLESS
+        here = float(self.near[self.form.joint - 1])
+        lower = limits.lower if math.isfinite(limits.lower) else min(here, limits.upper) - reach
+        upper = limits.upper if math.isfinite(limits.upper) else max(here, limits.lower) + reach
+        return lower, upper
 
     def _ends(self, values: Sequence[Array], missing: Sequence[Array]) -> list[_Interval]:
         """Return where runs of values inside begin and end, branch by branch, to the last digit."""

@@ -33,11 +33,16 @@ def joint_distances(arm: Arm, q_from: Array, q_to: Array) -> Array:
 def nearest_equivalent(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:
     """Return ``q`` (n,) with every angle wrapped to the equivalent inside the limits nearest to ``near``.
 
-    An angle with no equivalent inside the limits takes the one that passes its limit least.
+    An angle with no equivalent inside the limits takes the one that passes its limit least. Where the result passes a
+    limit of coupled drives, the nearest of the equivalents that pass none is taken, if there is one.
     """
     starts = joint_array(near, arm.n, "near").tolist()
     choices = _equivalents(arm, q, starts)
-    return np.array([min(turns, key=lambda x: abs(x - x0)) for turns, x0 in zip(choices, starts, strict=True)])
+    nearest = np.array([min(turns, key=lambda x: abs(x - x0)) for turns, x0 in zip(choices, starts, strict=True)])
+    if arm.coupling is None or not arm.coupling.limits or not violations(arm, nearest):
+        return nearest
+    inside = equivalent_configurations(arm, nearest)
+    return inside[joint_distances(arm, np.array(starts), inside).argmin()] if len(inside) else nearest
 
 
 def equivalent_configurations(arm: Arm, q: ArrayLike) -> Array:

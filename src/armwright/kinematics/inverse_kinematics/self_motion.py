@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse_kinematics.revolutions import nearest_equivalent
+from armwright.kinematics.inverse_kinematics.revolutions import midpoints, nearest_equivalent
 
 # The members (k, n) of a family of configurations that joint positions (k, n) to stay near lead to.
 Members: TypeAlias = Callable[[Array], Array]
@@ -118,7 +118,10 @@ def _interval(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, fl
 
 
 def excess(arm: Arm, q: Array) -> Array:
-    """Return the sums (...) by which joints of configurations (..., n) exceed limits, after shifts by revolutions."""
+    """Return the sums (...) by which joints, and coupled drives, of configurations (..., n) exceed limits.
+
+    Angles are shifted by revolutions to where they exceed them least.
+    """
     total = np.zeros(q.shape[:-1])
     for joint, values in zip(arm.joints, np.moveaxis(q, -1, 0), strict=True):
         lower, upper = joint.limits.lower, joint.limits.upper
@@ -129,4 +132,20 @@ def excess(arm: Arm, q: Array) -> Array:
         elif joint.revolute:
             beyond = np.zeros(q.shape[:-1])
         total += beyond
-    return total
+    return total if arm.coupling is None or not arm.coupling.limits else total + _drive_excess(arm, q)
+
+
+def _drive_excess(arm: Arm, q: Array) -> Array:
+    """Return the sums (...) by which coupled drives exceed their limits.
+
+    Left out are drives that depend on a joint with room for more than one turn: by another turn they may be inside.
+    """
+    assert arm.coupling is not None  # noqa: S101 - asked for coupled drives only
+    room, limits = arm.limits.upper - arm.limits.lower, arm.coupling.drive_limits
+    middle = midpoints(arm.limits.lower, arm.limits.upper, np.zeros(arm.n))
+    once = ~arm.revolute | (room <= _TURN)
+    q = np.where(arm.revolute & once, middle + np.remainder(q - middle + np.pi, _TURN) - np.pi, q)
+    m = arm.coupling.drives(q)
+    beyond = np.maximum(np.maximum(limits.lower - m, m - limits.upper), 0.0)
+    known = (arm.coupling.inverse[:, ~once] == 0).all(axis=1)
+    return np.asarray(np.where(known, beyond, 0.0).sum(axis=-1))
