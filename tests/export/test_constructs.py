@@ -65,6 +65,7 @@ PROGRAMS = {
     "COBEGIN, two things at the same time": (
         "COBEGIN BEGIN MOVE ARM_1 TO b END ; BEGIN PAUSE 0.1 ; OPERATE LAMP ON END COEND ;"
     ),
+    "a gripper of a second arm": "GRASP ARM_2 ;",
     "a second arm": "MOVE ARM_2 TO ARM_2 * XYZ(0, 0, 0.05) ;",
 }
 # Where a path is not a straight line after all; the straight way comes too near to the axis of joint 1.

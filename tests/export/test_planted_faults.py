@@ -204,6 +204,7 @@ def test_speeds_beyond_the_limits(target: str) -> None:
         ("rapid", "PROC main()", "PROC other()"),
         ("fanuc", "WAIT 0.50(sec)", "WAIT DI[1]=ON"),
         ("fanuc", "UFRAME_NUM=0", "UFRAME_NUM=1"),
+        ("fanuc", "PR[9]=LPOS", "PR[9]=JPOS"),
         ("fanuc", "UTOOL_NUM=9", "UTOOL_NUM=8"),
         ("fanuc", " FINE ;", " FINE Offset,PR[1] ;"),
         ("fanuc", "UT : 9,", "UT : 9, CONFIG : 'N U T, 0, 0, 0',"),

@@ -92,3 +92,14 @@ def test_raise_in_a_function_and_a_guard() -> None:
     END."""
 
     assert 20 < float(printed(run(text, cell_of("cell1")))[0]) < 30
+
+
+def test_deadlock_is_not_recovered() -> None:
+    """Where all processes wait for ever there is nobody to go on at RECOVER."""
+    text = """VAR n : SCALAR ; e, f : EVENT ; BEGIN n = 0 ;
+      TRY COBEGIN
+        BEGIN FOR n = 1 TO 1 DO WAIT e ; SIGNAL f END ; BEGIN WHILE n < 0 DO SIGNAL e ; WAIT f ; SIGNAL e END
+      COEND RECOVER PRINT("on") END
+    END."""
+
+    assert failure(text).diagnostic.code == "E501"

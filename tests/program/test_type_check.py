@@ -106,6 +106,14 @@ def test_types_of_expressions(text: str, expected: ExpressionType) -> None:
         ("2 * t", "E221", "`*` has no meaning between a number and a TRANS", "XYZ"),
         ("t * INV(f)", "E221", "`*` has no meaning between a TRANS and the inverse of a FRAME", "`INV(f) * g`"),
         ("1 + (n < 2)", "E221", "`+` has no meaning between a number and a condition", "AND and OR"),
+        ("INPUT(go) = TRUE", "E221", "`=` has no meaning between a condition and a condition", "write `INPUT(go)`"),
+        (
+            "FALSE = INPUT(go)",
+            "E221",
+            "`=` has no meaning between a condition and a condition",
+            "write `NOT INPUT(go)`",
+        ),
+        ("INPUT(go) <> TRUE", "E221", "`<>` has no meaning between a condition and a condition", "`NOT INPUT(go)`"),
         ("n AND n < 2", "E219", "AND needs a condition, but `n` is a SCALAR", "write `n <> 0`"),
         ("NOT f", "E219", "NOT needs a condition, but `f` is a FRAME", "such as `n > 0`"),
         ("e + 1", "E223", "`e` is an EVENT and cannot be computed with", ""),
@@ -210,13 +218,15 @@ def test_many_undeclared_names() -> None:
         ("n = half", "`half` is a FUNCTION and no variable", "has parentheses: `half(...)`"),
         ("n = one", "`one` is a FUNCTION and no variable", "has parentheses: `one()`"),
         ("n = swap", "`swap` is a procedure and no variable", "a statement of its own: `swap(...)`"),
+        ("WAIT b", "WAIT needs an EVENT, but `b` is a condition", "write `WAIT UNTIL b`"),
+        ("WAIT n", "WAIT needs an EVENT, but `n` is a SCALAR", "is declared with EVENT"),
         ("swap(n, n)", "`n` is passed twice to `swap`, which may change it", "a copy of it"),
         ("swap(a[n], a[n + 1])", "`a[n + 1]` may be passed twice to `swap`, which may change it", "a copy of it"),
     ],
 )
 def test_functions_and_procedures(call: str, message: str, help_: str) -> None:
-    """A function without its parentheses is told from a procedure, and an alias from what may be one."""
-    text = f"""VAR n : SCALAR ; a : ARRAY [3] OF SCALAR ;
+    """A function without its parentheses is told from a procedure, what may be an alias from one that is."""
+    text = f"""VAR n : SCALAR ; a : ARRAY [3] OF SCALAR ; b : BOOLEAN ;
     FUNCTION half (n : SCALAR) : SCALAR ; BEGIN RETURN n / 2 END ;
     FUNCTION one : SCALAR ; BEGIN RETURN 1 END ;
     PROCEDURE swap (INOUT x, y : SCALAR) ; VAR z : SCALAR ; BEGIN z = x ; x = y ; y = z END ;

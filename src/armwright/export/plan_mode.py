@@ -154,15 +154,18 @@ def refuse_guards(recording: Recording) -> None:
 
 
 def only_arm(recording: Recording) -> str:
-    """Return the name of the arm that moved; the first of the cell where none did."""
-    moved = dict.fromkeys(stage.arm for stage in recording.stages)
-    if len(moved) > 1:
-        first, second = list(moved)[:2]
-        span = next(stage.span for stage in recording.stages if stage.arm == second)
+    """Return the name of the arm that moved, or whose gripper did; the first of the cell where none did."""
+    used: dict[str, Span] = {}
+    for effect in recording.effects:
+        if effect.kind in ("MOVE", "OPEN", "GRASP") and effect.arm is not None:
+            used.setdefault(effect.arm, effect.span)
+    if len(used) > 1:
+        first, second = list(used)[:2]
+        span = used[second]
         text = f"{second} moves beside {first}, and the program of a controller moves one arm"
         helps = ["export the motions of all arms by `armwright export ros2` or `csv`"]
         raise refusal(recording.code.source, "E613", text, span, "a second arm moves here", helps=helps)
-    return next(iter(moved), min(recording.cell.arms))
+    return next(iter(used), min(recording.cell.arms))
 
 
 def _refuse_parallel(recording: Recording) -> None:

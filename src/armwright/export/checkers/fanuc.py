@@ -54,7 +54,8 @@ class _Reader:
         self.tool: Array | None = None
         self.actions: list[Action] = []
         self._places = places
-        self._register: dict[int, float] = {}
+        # The numbers of the position register; None while it may hold joints.
+        self._register: dict[int, float] | None = None
         self._tool_number = ""
 
     def statement(self, node: Any, line: int) -> None:
@@ -97,9 +98,11 @@ class _Reader:
         said = str(value.children[0]) if value.data in ("name", "register", "number") else ""
         if (output := re.fullmatch(r"DO\[(\d+)\]", target)) and said in ("ON", "OFF"):
             self.actions.append(OutputAction(line=line, output=int(output[1]), on=said == "ON"))
-        elif part := re.fullmatch(r"PR\[9,([1-6])\]", target):
+        elif (target, said) == ("PR[9]", "LPOS"):
+            self._register = {}
+        elif self._register is not None and (part := re.fullmatch(r"PR\[9,([1-6])\]", target)):
             self._register[int(part[1])] = number(value, line)
-        elif (target, said) == ("UTOOL[9]", "PR[9]") and len(self._register) == _JOINTS:
+        elif (target, said) == ("UTOOL[9]", "PR[9]") and self._register and len(self._register) == _JOINTS:
             X = np.eye(4)
             X[:3, :3] = from_zyx_degrees([self._register[i] for i in (6, 5, 4)])
             X[:3, 3] = np.array([self._register[i] for i in (1, 2, 3)]) / 1000.0

@@ -77,6 +77,8 @@ def write(program: ControllerProgram) -> ControllerFile:
     lines = [f"  !{line}" for part in comments for line in part]
     lines.append("  UFRAME_NUM=0")
     numbers = decimals([*(tool[:3, 3] * 1e3), *reversed(zyx_angles(tool[:3, :3]))], _DIGITS)
+    # A position register that was recorded in joints would take the numbers of the tool as joints.
+    lines.append(f"  PR[{_REGISTER}]=LPOS")
     lines += [f"  PR[{_REGISTER},{i}]={number}" for i, number in enumerate(numbers, 1)]
     lines += [f"  UTOOL[{_REGISTER}]=PR[{_REGISTER}]", f"  UTOOL_NUM={_REGISTER}"]
     positions: list[str] = []

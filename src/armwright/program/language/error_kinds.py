@@ -10,5 +10,5 @@ KINDS: Mapping[str, str] = {
     "TIMEOUT": "a wait has lasted too long",
     "FRAMES": "a frame without a pose, or one that cannot be attached",
     "VALUE": "a value that is missing or out of range, or a computation without a result",
-    "PROCESS": "processes that wait for one another, or use one arm",
+    "PROCESS": "two branches that use one arm, or too many processes",
 }

@@ -8,6 +8,7 @@ from armwright.program.semantics.expression_types import (
     TYPE_OF_KIND,
     ExpressionType,
     declared_type_phrase,
+    expression_text,
     variable_phrase,
 )
 from armwright.program.semantics.quantities import check_range, check_unit
@@ -81,8 +82,13 @@ def cobegin(context: Context, node: tree.Cobegin) -> None:
 def event(context: Context, node: tree.Signal | tree.Wait) -> None:
     """Check the event of a SIGNAL or WAIT."""
     what = f"{type(node).__name__.upper()} needs an EVENT"
-    advice = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
-    require_type(context.names, node.event, ExpressionType.EVENT, "E223", what, advice=lambda _: advice)
+    declared = "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`"
+    until = f"write `WAIT UNTIL {expression_text(node.event)}`" if isinstance(node, tree.Wait) else declared
+
+    def advice(actual: ExpressionType) -> str:
+        return until if actual is ExpressionType.CONDITION else declared
+
+    require_type(context.names, node.event, ExpressionType.EVENT, "E223", what, advice=advice)
     if isinstance(node, tree.Wait):
         _limit(context, node)
 

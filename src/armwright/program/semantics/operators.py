@@ -53,7 +53,7 @@ def negated_type(names: NameResolver, node: tree.Unary, operand_type: Expression
 def _operand_advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
     """Return what was probably meant; empty where that cannot be guessed."""
     if ExpressionType.CONDITION in (left, right):
-        return "a condition is not a number; combine conditions with AND and OR"
+        return _condition_advice(node)
     left_text, right_text = expression_text(node.left), expression_text(node.right)
     if ExpressionType.TEXT in (left, right) and node.operation == "+":
         return f"texts are joined by TEXT: write `TEXT({left_text}, {right_text})`"
@@ -71,6 +71,15 @@ def _operand_advice(node: tree.Binary, left: ExpressionType, right: ExpressionTy
         case operation if operation in COMPARISONS and both_poses:
             advice = f"for their distance write `DIST({left_text}, {right_text})`"
     return advice
+
+
+def _condition_advice(node: tree.Binary) -> str:
+    """Return what was probably meant where a condition is computed with: TRUE and FALSE are not compared with."""
+    for value, condition in ((node.right, node.left), (node.left, node.right)):
+        if node.operation in ("=", "<>") and isinstance(value, tree.Name) and value.key in ("TRUE", "FALSE"):
+            holds = (value.key == "TRUE") == (node.operation == "=")
+            return f"write `{'' if holds else 'NOT '}{expression_text(condition)}`"
+    return "a condition is not a number; combine conditions with AND and OR"
 
 
 def _product_advice(left: ExpressionType, right: ExpressionType, left_text: str, right_text: str) -> str:

@@ -31,6 +31,8 @@ from armwright.program.syntax.token_stream import PanicModeError, TokenStream, d
 _T = TypeVar("_T")
 _CONDITION = "a condition"
 _EVENT = "the name of an EVENT"
+# What may stand behind a name in a condition.
+_OF_CONDITIONS = ("(", "=", "<>", "<", "<=", ">", ">=", "AND", "OR")
 _OPERANDS = (TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM)
 _DOWNTO = "DOWNTO"
 _ELSE_IF_SPELLINGS = ("ELSEIF", "ELSIF", "ELIF")
@@ -423,6 +425,8 @@ def wait(tokens: TokenStream) -> tree.Wait | tree.WaitUntil:
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
         tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
     event = variable(tokens, _EVENT, "after WAIT")
+    if tokens.standard is Standard.RLO_2 and tokens.current.key in _OF_CONDITIONS:
+        tokens.fail(f"expected {_EVENT} after WAIT", "a condition", advice="for a condition write `WAIT UNTIL ...`")
     return tokens.node(tree.Wait, start, *_limited(tokens, start, event))
 
 
