@@ -100,6 +100,9 @@ studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones
 pictures: $(VENV)/docs  ## Draw the pictures of the physics pages, and take those of the tutorial on the studio
 	$(BIN)/python docs/pictures/make.py
 
+arms: $(VENV)/core  ## Write the table of the catalogue into the page of arm files
+	$(BIN)/python docs/make_arms.py
+
 messages: $(VENV)/core  ## Write the page of all messages
 	$(BIN)/python docs/make_messages.py
 
