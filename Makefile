@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 CONSTRAINTS ?= constraints.txt
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(abspath $(CONSTRAINTS)))
 
-.PHONY: help demo test proof bench jupyter edges examples docs site gallery studies pictures messages editor fuzz versions sbom clean
+.PHONY: help demo test proof bench jupyter edges examples docs site gallery studies pictures arms messages editor fuzz versions sbom clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
