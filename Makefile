@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 CONSTRAINTS ?= constraints.txt
 export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(abspath $(CONSTRAINTS)))
 
-.PHONY: help demo test proof bench jupyter edges examples docs site gallery studies pictures messages editor fuzz versions sbom clean
+.PHONY: help demo test proof bench jupyter edges examples docs site gallery studies pictures arms messages editor fuzz versions sbom clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -99,6 +99,9 @@ studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones
 
 pictures: $(VENV)/docs  ## Draw the pictures of the physics pages, and take those of the tutorial on the studio
 	$(BIN)/python docs/pictures/make.py
+
+arms: $(VENV)/core  ## Write the table of the catalogue into the page of arm files
+	$(BIN)/python docs/make_arms.py
 
 messages: $(VENV)/core  ## Write the page of all messages
 	$(BIN)/python docs/make_messages.py

@@ -104,6 +104,20 @@ def test_every_number_has_one_document(name: str) -> None:
     assert set(given) <= set(QUANTITIES)
 
 
+def test_the_page_lists_every_arm() -> None:
+    """The page of arm files has a row for each arm, as docs/make_arms.py writes it from their documents."""
+    page = (Path(__file__).parents[2] / "docs" / "arms.md").read_text(encoding="utf-8")
+    heads = "positions", "speeds", "efforts", "masses", "drives", "coupling", "solids"
+    for arm in arm_summaries():
+        (row,) = [line for line in page.splitlines() if line.startswith(f"| `{arm.name}` |")]
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        given = {quantity for document in arm.documents for quantity in document.gives}
+        two = sum(map(gives_geometry, arm.documents)) > 1
+
+        assert cells[1:4] == [arm.title, str(arm.joints), "two documents" if two else "one document"]
+        assert [cell == "yes" for cell in cells[4:]] == [head in given for head in heads]
+
+
 @pytest.mark.drawn(FEW)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_list_says_what_the_arm_is(name: str) -> None:

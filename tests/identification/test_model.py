@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.coupling import Coupling
 from armwright.arm.drive import Motor, Spring
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
@@ -13,7 +14,9 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.regressors import dynamic_parameters
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.identification import DynamicModel, structural_count
+from armwright.identification.feasible import arm_of
 from armwright.identification.groupings import groupings
+from armwright.identification.model import LINK_NAMES
 from oracles.arms import random_arm, random_configurations
 from samples import Sample
 
@@ -114,6 +117,31 @@ def test_power_of_a_coupling_is_that_of_its_motors(rng: np.random.Generator) -> 
     efforts, speeds = rng.normal(size=(2, 6))
 
     assert model.joint_efforts(efforts) @ speeds == pytest.approx(efforts @ (coupling @ speeds))
+
+
+def test_coupling_of_the_arm(sample: Sample) -> None:
+    """An arm with coupled drives has their parameters: its own numbers give its efforts, and give the arm back."""
+    for rng in sample.cases(10):
+        C = np.eye(6)
+        C[2, 1], C[5, 4] = -1.0, rng.uniform(0.2, 1.0)
+        plain = load_arm("puma560")
+        motors = [Motor(inertia=m, viscous=v) for m, v in rng.uniform(0.5, 3.0, (6, 2))]
+        arm = attrs.evolve(plain, motors=motors, coupling=Coupling(matrix=C))
+        model = DynamicModel(arm=arm, terms=("rotor", "viscous"))
+        assert model.coupled_motors == (2, 5)
+        values = dict.fromkeys(model.names, 0.0)
+        links = [f"{name}{i}" for i in range(1, 7) for name in LINK_NAMES]
+        values |= dict(zip(links, dynamic_parameters(arm)[: len(links)].tolist(), strict=True))
+        for i, motor in enumerate(motors):
+            before = "coupled_" if i in model.coupled_motors else ""
+            values |= {f"{before}rotor{i + 1}": motor.inertia, f"{before}viscous{i + 1}": motor.viscous}
+        theta = np.array(list(values.values()))
+        motion = rng.uniform(-1, 1, (3, 20, 6))
+
+        expected = inverse_dynamics(arm, *motion)
+
+        np.testing.assert_allclose(model.columns(*motion) @ theta, expected, atol=1e-9)
+        np.testing.assert_allclose(inverse_dynamics(arm_of(model, theta), *motion), expected, atol=1e-9)
 
 
 def test_groupings_are_those_of_two_links_in_a_plane() -> None:

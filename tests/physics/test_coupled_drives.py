@@ -129,7 +129,7 @@ def test_a_servo_of_coupled_drives(sensors: Sensors) -> None:
 
 
 def test_file(tmp_path: Path) -> None:
-    """The file of an arm with coupled drives has tendons, moves as the arm, and is not read as another arm."""
+    """The file of an arm with coupled drives has tendons, moves as the arm, and is read as the same arm."""
     arm, path = unlimited(coupled_puma()), tmp_path / "arm.xml"
     path.write_text(arm_mjcf(arm).text, encoding="utf-8")
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -143,5 +143,37 @@ def test_file(tmp_path: Path) -> None:
     # Massless links of this arm are padded in the file.
     np.testing.assert_allclose(M, mass_matrix(arm, np.full(6, 0.3)), rtol=0, atol=1e-3 * heaviest)
     np.testing.assert_allclose(M[1:, 2], mass_matrix(arm, np.full(6, 0.3))[1:, 2], rtol=0, atol=1e-3 * heaviest)
-    with pytest.raises(FileFormatError, match="joint2': the tendon 'drive3' acts on it; an arm can only"):
-        load_mjcf(path)
+    again = load_mjcf(path)
+    assert again.coupling is not None
+    assert arm.coupling is not None
+    np.testing.assert_allclose(again.coupling.matrix, arm.coupling.matrix, atol=1e-12)
+    np.testing.assert_allclose(mass_matrix(again, np.full(6, 0.3)), M, atol=1e-9 * heaviest)
+
+
+def test_limits_in_a_file(tmp_path: Path) -> None:
+    """Limits of joints and of drives come back from a file, each where it was, and the friction of the drives."""
+    C = np.eye(6)
+    C[2, 1] = -1.0
+    drives = [Limits()] * 2 + [Limits(lower=-1.5, upper=1.0, effort=40.0), Limits(effort=9.0), Limits(), Limits()]
+    arm = attrs.evolve(load_arm("ur5"), coupling=Coupling(matrix=C, limits=drives))
+    arm = attrs.evolve(
+        arm, motors=[Motor(inertia=0.1, viscous=i, coulomb_forward=i, coulomb_backward=i) for i in range(6)]
+    )
+    path = tmp_path / "arm.xml"
+    path.write_text(arm_mjcf(arm).text, encoding="utf-8")
+
+    again = load_mjcf(path)
+
+    assert again.coupling == arm.coupling
+    assert again.motors == arm.motors
+    np.testing.assert_array_equal(again.limits.effort, arm.limits.effort)
+    np.testing.assert_allclose(again.limits.upper, arm.limits.upper)
+
+
+def test_drives_of_locked_joints(tmp_path: Path) -> None:
+    """A drive of a joint that is held is none of the arm, which is said with the name of its tendon."""
+    path = tmp_path / "arm.xml"
+    path.write_text(arm_mjcf(belt()).text, encoding="utf-8")
+
+    with pytest.raises(FileFormatError, match="the tendon 'drive2' is a drive of joints that are not all moved by the"):
+        load_mjcf(path, lock=["joint1"])

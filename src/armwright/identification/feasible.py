@@ -176,7 +176,8 @@ def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:
 
     Args:
         model: of the arm.
-        values: (p,) its parameters, which bodies and drives can have; those of coupled motors are left out.
+        values: (p,) its parameters, which bodies and drives can have. An arm with a coupling has the rotors and the
+            friction of its coupled motors, and not those of their joints beside; another one those of its joints alone.
         title: what the source of the numbers is called.
     """
     arm = model.arm
@@ -188,6 +189,8 @@ def arm_of(model: DynamicModel, values: Array, title: str = "") -> Arm:
     motors, joints = [], []
     for i, (motor, joint) in enumerate(zip(arm.motors, arm.joints, strict=True), 1):
         own = {term: named[f"{term}{i}"] for term in model.terms}
+        if arm.coupling is not None and i - 1 in model.coupled_motors:
+            own = {term: named.get(f"coupled_{term}{i}", 0.0) for term in model.terms}
         coulomb = own.get("coulomb", 0.0)
         motors.append(
             Motor(

@@ -62,7 +62,7 @@ def identify(
         arm: the arm as drawn, with n joints; its masses are the prior of what motions cannot tell.
         logs: of its motions, sampled alike.
         check: logs that are held out from everything, to validate with.
-        coupling: (n, n) positions of motors by those of joints: see ``DynamicModel``.
+        coupling: (n, n) positions of motors by those of joints; that of the arm when left out: see ``DynamicModel``.
         laws: of friction, to choose from.
         cutoff: of the filter [Hz]; chosen when left out.
         decimation: readings that are averaged to one equation; by the cut-off when left out.

@@ -49,8 +49,8 @@ class DynamicModel:
         terms: of each joint beside its link, of ``TERMS``. ``coulomb`` is alike both ways, ``forward`` and
             ``backward`` are not; the pull of a spring at position 0 is in ``offset``.
         stribeck_speed: (n,) speed at which 1/e of the Stribeck friction is left [rad/s] or [m/s].
-        coupling: (n, n) positions of the motors, in units of the joints, by those of the joints: the identity where
-            every motor moves its own joint alone.
+        coupling: (n, n) positions of the motors, in units of the joints, by those of the joints: that of the arm, if
+            left out, the identity where every motor moves its own joint alone.
     """
 
     arm: Arm
@@ -59,7 +59,7 @@ class DynamicModel:
         default=attrs.Factory(lambda self: np.full(self.arm.n, STRIBECK_SPEED), takes_self=True), converter=read_only
     )
     coupling: Array = attrs.field(
-        default=attrs.Factory(lambda self: np.eye(self.arm.n), takes_self=True), converter=read_only
+        default=attrs.Factory(lambda self: _motors_by_joints(self.arm), takes_self=True), converter=read_only
     )
 
     def __attrs_post_init__(self) -> None:
@@ -180,6 +180,11 @@ class BaseParameters:
     columns: tuple[int, ...]
     names: tuple[str, ...]
     combinations: Array
+
+
+def _motors_by_joints(arm: Arm) -> Array:
+    """Return the positions of the motors by those of the joints, (n, n), as the arm has them."""
+    return np.eye(arm.n) if arm.coupling is None else arm.coupling.inverse
 
 
 def _skeleton(arm: Arm) -> Arm:

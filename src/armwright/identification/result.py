@@ -153,8 +153,14 @@ class Identification:
         if self.weak:
             named = listed([each.name for each in self.weak], _MAX_NAMED)
             yield f"{counted(len(self.weak), 'base parameter')} hardly known, to {LARGEST_ERROR:.0%} or worse: {named}"
-        if self.model.coupled_motors:
-            yield "the arm file has no coupled motors: their rotors and friction are among the base parameters alone"
+        if self.model.coupled_motors and self.model.arm.coupling is None:
+            yield "the arm has no coupling: rotors and friction of coupled motors are among the base parameters alone"
+        elif self.model.coupled_motors:
+            named = listed([self.model.arm.joint_label(motor) for motor in self.model.coupled_motors], _MAX_NAMED)
+            yield (
+                f"{named}: the arm has rotors and friction of the coupled motors; what the joints have beside is among "
+                "the base parameters alone"
+            )
 
     def as_data(self) -> dict[str, Any]:
         """Return it as plain data in SI units."""

@@ -48,7 +48,7 @@ def _efforts(mujoco: Any, model: Any, joint: int) -> tuple[float, float]:
     acting = [i for i in range(model.nu) if _acts_on(mujoco, model, i, joint)]
     for i in acting:
         gear = float(model.actuator_gear[i][0])
-        ends = sorted(gear * force if gear else 0.0 for force in _forces(mujoco, model, i))
+        ends = sorted(gear * force if gear else 0.0 for force in forces_of(model, i))
         lower, upper = lower + ends[0], upper + ends[1]
     if not acting:
         lower, upper = -math.inf, math.inf
@@ -63,8 +63,9 @@ def _acts_on(mujoco: Any, model: Any, actuator: int, joint: int) -> bool:
     return int(model.actuator_trntype[actuator]) in kinds and int(model.actuator_trnid[actuator][0]) == joint
 
 
-def _forces(mujoco: Any, model: Any, actuator: int) -> tuple[float, float]:
+def forces_of(model: Any, actuator: int) -> tuple[float, float]:
     """Return the smallest and the largest force of an actuator."""
+    mujoco = load_mujoco()
     lower, upper = -math.inf, math.inf
     if model.actuator_forcelimited[actuator]:
         lower, upper = model.actuator_forcerange[actuator].tolist()

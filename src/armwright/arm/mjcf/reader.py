@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from armwright.arm.mjcf.compiled import compile_mjcf
+from armwright.arm.mjcf.couplings import with_coupling
 from armwright.arm.mjcf.elements import read_text
 from armwright.arm.mjcf.tree import MjcfTree, tree_of
 from armwright.arm.model import Arm
@@ -83,6 +85,8 @@ def arm_in(tree: MjcfTree, base: str | None = None, tip: str | None = None) -> R
     model = tree.model
     gravity = model.opt.gravity * (not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     try:
-        return serial_arm(tree, base, tip, np.array(gravity), "stated")
+        reading = serial_arm(tree, base, tip, np.array(gravity), "stated")
+        numbers = {joint.name: joint.number for joint in tree.parent_joints.values() if joint.number >= 0}
+        return attrs.evolve(reading, arm=with_coupling(model, reading.arm, numbers))
     except (InvalidValueError, ShapeError) as error:
         raise FileFormatError(tree.path, None, "", str(error)) from error
