@@ -65,7 +65,9 @@ class Standard:
     smallest: float
 
 
-def feasible(model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1.0) -> Standard:
+def feasible(
+    model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1.0, is_refined: bool = True
+) -> Standard:
     """Return the physically possible parameters that explain measurements best.
 
     Args:
@@ -73,6 +75,7 @@ def feasible(model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1
         sums: of the measured equations.
         sigma: (n,) standard deviations of the residuals of each joint [N m] or [N].
         weight: of the drawing: its distance from the links counts as so many squared standard deviations; above 0.
+        is_refined: whether what only the drawing tells is found to the last digit, too; efforts do not ask for that.
 
     Raises:
         MissingExtraError: Clarabel is not installed.
@@ -82,7 +85,7 @@ def feasible(model: DynamicModel, sums: Sums, sigma: Array, *, weight: float = 1
     bounded = [k for k, name in names if name.rstrip("0123456789").removeprefix("coupled_") in _DISSIPATING]
     drawing = [_pseudo_inertia(body) for body in _drawing(model.arm)]
     measured = Measured(combinations=model.base.combinations, sums=sums, sigma=sigma)
-    values, smallest = possible_bodies(measured, drawing, bounded, weight=weight)
+    values, smallest = possible_bodies(measured, drawing, bounded, weight=weight, is_refined=is_refined)
     return Standard(values=values, base=model.base.combinations @ values, weight=weight, smallest=smallest)
 
 
@@ -101,7 +104,12 @@ class Measured(NamedTuple):
 
 
 def possible_bodies(
-    measured: Measured, drawing: Sequence[Array], bounded: Sequence[int], *, weight: float
+    measured: Measured,
+    drawing: Sequence[Array],
+    bounded: Sequence[int],
+    *,
+    weight: float,
+    is_refined: bool = True,
 ) -> tuple[Array, float]:
     """Return parameters (p,) that bodies and drives can have, and the least eigenvalue of any pseudo-inertia.
 
@@ -110,6 +118,7 @@ def possible_bodies(
         drawing: pseudo-inertias (4, 4) of the bodies as drawn, positive definite.
         bounded: parameters that cannot be negative.
         weight: of the drawing.
+        is_refined: whether the last digits are found, too.
 
     Raises:
         MissingExtraError: Clarabel is not installed.
@@ -151,7 +160,8 @@ def possible_bodies(
     # Of drives whose terms show nowhere nothing is known, and no solver can know.
     lengths = np.linalg.norm(columns, axis=0)
     shows = (lengths > _SHOWS * lengths.max()) | (np.arange(len(scales)) < OF_LINK * len(drawing))
-    x = refinement.of(np.where(shows, solution.x[: len(scales)], 0.0))
+    x = np.where(shows, solution.x[: len(scales)], 0.0)
+    x = refinement.of(x) if is_refined else x
     values = np.where(shows & (np.abs(x) > _NOTHING), x, 0.0) * scales
     links = values[: OF_LINK * len(drawing)].reshape(-1, OF_LINK)
     return values, min(float(eigvalsh(_unfolded(own), P0)[0]) for own, P0 in zip(links, drawing, strict=True))

@@ -286,10 +286,11 @@ def _drawing_weight(model: DynamicModel, folds: Sequence[Sums], sigma: Array) ->
     if len(folds) < 2:
         return _WEIGHTS[0], []
     total = _total(folds)
-    errors = [
-        float(np.mean([_mean(fold, feasible(model, total - fold, sigma, weight=each).base, sigma) for fold in folds]))
-        for each in _WEIGHTS
-    ]
+
+    def error(fold: Sums, weight: float) -> float:
+        return _mean(fold, feasible(model, total - fold, sigma, weight=weight, is_refined=False).base, sigma)
+
+    errors = [float(np.mean([error(fold, weight) for fold in folds])) for weight in _WEIGHTS]
     best = int(np.argmin(errors))
     return _WEIGHTS[best], [
         Choice("drawing", f"weight {each:g}", float(np.sqrt(error)), i == best)

@@ -141,11 +141,12 @@ class Identification:
             f"filter of {preparation.cutoff:.3g} Hz; positions are read {preparation.delay * 1e3:.2f} "
             f"± {self.delay_error * 1e3:.2f} ms later than efforts"
         )
-        if fit.correlation.size:
+        if fit.correlation.size and fit.correlation.max() > 1:
             most = int(np.argmax(fit.correlation))
+            count, alone = int(fit.counts[most]), int(fit.counts[most] / fit.correlation[most])
             yield (
-                f"residuals hang together in time: those of {self.model.arm.joint_label(most)} tell as much as "
-                f"{1 / max(float(fit.correlation[most]), 1.0):.0%} as many independent ones; the errors know it"
+                f"residuals hang together in time: {count:,} of {self.model.arm.joint_label(most)} tell as much as "
+                f"{alone:,} independent ones; the errors know it"
             )
         if fit.outliers:
             where = listed([_outlier_text(each) for each in fit.outliers], _MAX_NAMED)

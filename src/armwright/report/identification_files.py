@@ -42,9 +42,10 @@ def identification_files(found: Identification, *, title: str, command: str) -> 
     shown = found.validation or found.training
     kind = "held-out" if found.validation else "fitted"
     caption = f"Efforts of the {kind} log {shown[0].name}: measured, and predicted"
+    held_out = "; red: held out" if found.validation else ""
     drawn = [
         Drawing("efforts", caption, _efforts(found, shown[0])),
-        Drawing("residuals", "What is not predicted of all logs, by joint, one after the other", _residuals(found)),
+        Drawing("residuals", f"What is not predicted of all logs, one after the other{held_out}", _residuals(found)),
     ]
     files: dict[str, str] = {}
     if found.arm is not None:
@@ -119,7 +120,7 @@ def _efforts(found: Identification, shown: Prediction) -> str:
     for i, axes in enumerate(figure.axes):
         axes.plot(shown.t[rows], shown.measured[rows, i], color="0.6", linewidth=1.4, label="measured")
         axes.plot(shown.t[rows], shown.predicted[rows, i], color="C0", linewidth=0.9, label="predicted")
-    figure.axes[0].legend(fontsize="x-small", loc="upper right", ncols=2)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), fontsize="small", loc="outside upper right", ncols=2)
     return svg_text(figure)
 
 
