@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NoReturn
 
 import attrs
@@ -9,10 +10,12 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
+from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import IncapableArmError, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.arc import FlatArcError
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
+from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import (
     MOVE_PARTS,
@@ -262,7 +265,7 @@ def _plan_stages(
         speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
     )
     try:
-        stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
+        stages = plan(_planner(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except FlatArcError as error:
@@ -275,6 +278,14 @@ def _plan_stages(
     if request.duration is not None:
         stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
+
+
+def _planner(machine: Machine, arm: str) -> AnyArm:
+    """Return what a MOVE is planned with: the functions of the arm, and the efforts of what it holds as well."""
+    own, loaded = machine.cell.arms[arm].arm, machine.loaded_arm(arm)
+    if loaded is own:
+        return planning_arm(own)
+    return solver_of(planning_arm(own))._replace(arm=loaded, inverse_dynamics=partial(inverse_dynamics, loaded))
 
 
 def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: str) -> Array | None:
@@ -383,7 +394,7 @@ def _start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     if motion.stage_index >= 0:
         record_contact(machine, motion)
     push = send_trajectory(machine, motion, trajectory)
-    tau = trajectory_efforts(arm, trajectory, period, push, counted)
+    tau = trajectory_efforts(machine.loaded_arm(motion.arm), trajectory, period, push, counted)
     update_depth_alarm(machine, motion)
     touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
