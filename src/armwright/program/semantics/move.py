@@ -18,7 +18,6 @@ _CONFLICTS_WITH_DIRECTLY: dict[type, tuple[str, str]] = {
     tree.Via: ("via points given here", "allows no via points"),
     tree.Approach: ("approach point given here", "allows no approach point"),
     tree.Departure: ("departure point given here", "allows no departure point"),
-    tree.Blend: ("rounded corners asked for here", "has no corners"),
 }
 SPEED_NOTE = "100 is the normal speed and 120 the maximum of the arm"
 
@@ -74,7 +73,7 @@ _CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Appro
 def _check_guard_place(names: NameResolver, node: tree.Move, head: Span) -> None:
     """Report a guard of a MOVE that goes over into the next one."""
     kinds = {type(clause): clause for clause in node.clauses}
-    if tree.Blend in kinds and tree.Straightly in kinds and tree.Via not in kinds:
+    if tree.Blend in kinds and tree.Via not in kinds:
         text, here = (
             "a MOVE that goes over into the next one has no guard",
             labels(kinds[tree.Blend].span, "BLEND here"),
@@ -176,17 +175,15 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
             names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)
-    if blend and not direct and tree.Via not in first and tree.Circularly not in first:
-        _check_going_over(names, blend, straight, first)
+    if blend and tree.Via not in first and tree.Circularly not in first:
+        _check_going_over(names, blend, first)
 
 
-def _check_going_over(
-    names: NameResolver, blend: tree.Clause, straight: tree.Clause | None, first: dict[type, tree.Clause]
-) -> None:
-    """Check a BLEND without VIA: a MOVE goes over into the next one only on a straight line."""
-    if straight is None:
+def _check_going_over(names: NameResolver, blend: tree.Clause, first: dict[type, tree.Clause]) -> None:
+    """Check a BLEND without VIA: a MOVE of one stage goes over into the next one."""
+    if tree.Approach in first or tree.Departure in first:
         text = "BLEND rounds the corners at via points, but there is no VIA"
-        advice = "add `VIA ( ... )`, or STRAIGHTLY to go over into the next MOVE, or leave BLEND out"
+        advice = "add `VIA ( ... )`, or write a MOVE for each leg, which goes over into the next one"
         names.report("E226", text, blend.span, "no corners to round", advice=advice)
     elif (duration := first.get(tree.Duration)) is not None:
         text = "a MOVE that goes over into the next one has no DURATION of its own"

@@ -82,11 +82,18 @@ def _put_ahead(machine: Machine, process: Process, ahead: MovesAhead, request: M
         return
     arm, goal = ahead.arm, request.goals[request.form.goal]
     X_BW, X_MH = inverse(machine.base_pose(arm)), inverse(machine.state.tree.relation(moved, arm))
-    X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
-    # What its operand names may be another thing when the MOVE begins.
-    goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    joints = _goal_joints(machine, process, request, arm)
+    if joints is None:
+        X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
+        # What its operand names may be another thing when the MOVE begins.
+        goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    else:
+        X_BH = forward(machine.cell.arms[arm].arm, joints)
+        goal = goal._replace(operand="")
     request = request._replace(goals={request.form.goal: goal})
-    ahead = attrs.evolve(ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH))
+    ahead = attrs.evolve(
+        ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH), joints=(*ahead.joints, joints)
+    )
     if goes_over(request):
         process.ahead = ahead
         # What is worked out before the arm is there takes it for being there.
@@ -100,7 +107,7 @@ def begin_moves_ahead(machine: Machine, process: Process, ahead: MovesAhead) -> 
     """Begin the MOVEs that have waited for the next one, as one path that stops at its end."""
     process.ahead = None
     machine.update_hand_pose(ahead.arm, ahead.requests[0].span)
-    request = merged(ahead.requests, ahead.poses)
+    request = merged(ahead)
     _begin_move(machine, process, request, ahead.arm, ahead.moved, implied=ahead.implied_affix)
 
 
@@ -255,7 +262,7 @@ def _plan_stages(
         StageGoal(
             kind=legs.kind.value,
             poses=np.stack([pose(label) for label in legs.frames]),
-            joints=joints if request.form.goal in legs.frames else None,
+            joints=_stage_joints(request, joints, legs.frames, cell_arm.arm.n),
             blend=request.blend,
             corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
@@ -286,6 +293,14 @@ def _planner(machine: Machine, arm: str) -> AnyArm:
     if loaded is own:
         return planning_arm(own)
     return solver_of(planning_arm(own))._replace(arm=loaded, inverse_dynamics=partial(inverse_dynamics, loaded))
+
+
+def _stage_joints(request: MoveRequest, joints: Array | None, frames: Sequence[str], count: int) -> Array | None:
+    """Return the joint positions that a stage goes to, (n,) or past several frames (k, n); None for none."""
+    if not request.fixed_joints:
+        return joints if request.form.goal in frames else None
+    rows = np.array([request.fixed_joints.get(label, np.full(count, np.nan)) for label in frames])
+    return rows if len(frames) > 1 else rows[0]
 
 
 def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: str) -> Array | None:
