@@ -5,8 +5,9 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.kinematics import forward
+from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.vm.recording import Recording
-from program.running import failure, printed, run
+from program.running import cell_of, code_of, failure, printed, run
 from samples import Sample
 
 FRAMES = """VAR f, g, h, part : FRAME ; n : SCALAR ; ready : EVENT ;
@@ -192,6 +193,38 @@ def test_limits(sample: Sample) -> None:
     sample.record("MOVEs that go over into one another, limits at 300 random times", sample.count(30), failures)
 
     assert not failures
+
+
+def test_in_the_debugger() -> None:
+    """A step over a MOVE that waits takes no time; it is shown; and a step back takes it back."""
+    cell = cell_of("cell1")
+    text = """MOVE ARM_1 TO g STRAIGHTLY, WITH BLEND = 0.02 ;
+    n = 7 ;
+    MOVE ARM_1 TO h STRAIGHTLY ;
+    PRINT(n) ;"""
+    debugger = Debugger(code_of(f"{FRAMES}{text} END.", cell), cell)
+    debugger.begin()
+    debugger.run_slice()
+    place = FRAMES.count("\n") + 1
+
+    def step(command: Command) -> int:
+        debugger.resume(command)
+        debugger.run_slice()
+        return debugger.code.source.line(debugger.stack()[0].span.start)
+
+    while step("next") != place:
+        pass
+    begun = debugger.time
+    assert step("next") == place + 1
+    assert debugger.time == begun
+    assert "g" in [one.value for scope in debugger.scopes((), 0) for one in scope.children() if "wait" in one.name]
+    assert step("next") == place + 2
+    assert debugger.time == begun
+    assert step("next") == place + 3
+    assert debugger.time > begun + 0.5
+    assert [step("back") for _ in range(3)] == [place + 2, place + 1, place]
+    assert debugger.time == begun
+    assert debugger.machine.state.program.ahead is None
 
 
 # ---- of the joints -------------------------------------------------------------------------------------------------
