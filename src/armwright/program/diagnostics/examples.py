@@ -1,11 +1,12 @@
 """Trying out the programs of the pages: their comments say in what cell, in what language, within what limits.
 
 ``// std=83`` and ``// strict`` are the options of the command line. ``// cell: arms ARM_1, ARM_2`` tells what a
-program is checked against, and so do ``frames``, ``devices``, ``visions``, ``inputs``, ``analogue``, ``joints`` and
-``targets``; ``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the
-program run in a cell that comes with the pages, with ``// around: via``, ``// limits: steps 1000`` and ``// physics``
-as on the command line; ``// effort: 60 in joint 2`` makes a joint of its arms that weak. ``// export urscript`` has its
-motion exported afterwards, by ``armwright.export``.
+program is checked against, and so do ``frames``, ``devices``, ``visions``, ``inputs`` and ``analogue``;
+``// import: parts.toml: CUP, LID on CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the program run in a
+cell that comes with the pages, with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command
+line; ``// effort: 60 in joint 2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported
+afterwards, by ``armwright.export``.
+``// cell: joints ARM_1 RRPRRR`` tells which joints turn and which slide, ``targets HOME of ARM_1`` of joint targets.
 """
 
 import re

@@ -86,19 +86,19 @@ def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> 
     """Check a goal that is given by joint positions: what goes to it, and how."""
     if joint_target(names.scope, goal) is None:
         if not goal.arguments:
-            names.report("E242", "JOINTS takes a position for each joint", goal.span, "no positions here")
+            names.report("E246", "JOINTS takes a position for each joint", goal.span, "no positions here")
         for argument in goal.arguments:
             require_type(names, argument, ExpressionType.SCALAR, "E216", "a joint position is a number")
     if not isinstance(node.moved, tree.ArmName | tree.Poison):
         text = f"JOINTS is a goal for an arm, not for {quote_expression(node.moved)}"
         advice = "move the arm that carries it"
-        names.report("E241", text, node.moved.span, "this is not an arm", advice=advice)
+        names.report("E245", text, node.moved.span, "this is not an arm", advice=advice)
     for clause in node.clauses:
         if isinstance(clause, _CONFLICTS_WITH_JOINTS):
             word = tree.clause_word(type(clause))
             text, here = f"{word} cannot be combined with JOINTS", labels(goal.span, "joint positions given here")
             advice = "let one MOVE go to a frame, and the next to JOINTS"
-            names.report("E241", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
+            names.report("E245", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
 
 
 def _check_speed(names: NameResolver, node: tree.Expression) -> None:
@@ -150,17 +150,17 @@ def _check_arc(names: NameResolver, circular: tree.Clause, first: dict[type, tre
     via = first.get(tree.Via)
     if not isinstance(via, tree.Via):
         advice = "write `CIRCULARLY, VIA (f)` with a frame on the arc"
-        names.report("E243", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
+        names.report("E247", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
     elif len(via.points) > 1:
         text, here = f"an arc passes one frame, not {len(via.points)}", labels(circular.span, "an arc asked for here")
         advice = "write one `MOVE ... CIRCULARLY` for each arc"
-        names.report("E243", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
+        names.report("E247", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
     for kind in (tree.Straightly, tree.Approach, tree.Departure, tree.Blend):
         if clause := first.get(kind):
             text = f"CIRCULARLY cannot be combined with {tree.clause_word(kind)}"
             here = labels(circular.span, "requests one arc")
             advice = "write a MOVE for the arc, and one for each other leg"
-            names.report("E243", text, clause.span, "another way", secondary=here, advice=advice)
+            names.report("E247", text, clause.span, "another way", secondary=here, advice=advice)
 
 
 def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:

@@ -317,14 +317,14 @@ def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: 
         if asked not in targets:
             known = [f"joint targets of the cell: {', '.join(sorted(targets)) or 'none'}"]
             text = f"the cell has no joint target `{machine.spelling(asked)}`"
-            raise machine.error(process, "E242", text, span, "no such joint target", notes=known)
+            raise machine.error(process, "E246", text, span, "no such joint target", notes=known)
         if targets[asked].arm != arm:
             text = f"joint target `{machine.spelling(asked)}` is one of {targets[asked].arm}, not of {arm}"
-            raise machine.error(process, "E242", text, span, "of another arm")
+            raise machine.error(process, "E246", text, span, "of another arm")
         return targets[asked].q
     if len(asked) != model.n:
         text = f"{arm} has {counted(model.n, 'joint')}, but JOINTS is given {len(asked)}"
-        raise machine.error(process, "E242", text, span, f"expected {model.n} positions")
+        raise machine.error(process, "E246", text, span, f"expected {model.n} positions")
     units = machine.code.units
     return np.asarray(np.where(model.revolute, units.radians, units.metres) * np.array(asked))
 
