@@ -129,7 +129,7 @@ def test_positions_of_another_cell(goal: str) -> None:
     cell = taught_cell()
     with pytest.raises(RunError) as caught:
         interpret(code, cell, Simulator(cell))
-    assert caught.value.diagnostic.code == "E242"
+    assert caught.value.diagnostic.code == "E246"
 
 
 def test_tools() -> None:

@@ -5,8 +5,9 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.kinematics import forward
+from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.vm.recording import Recording
-from program.running import failure, printed, run
+from program.running import cell_of, code_of, failure, printed, run
 from samples import Sample
 
 FRAMES = """VAR f, g, h, part : FRAME ; n : SCALAR ; ready : EVENT ;
@@ -190,5 +191,126 @@ def test_limits(sample: Sample) -> None:
             and len(recording.stages) == 2
         )
     sample.record("MOVEs that go over into one another, limits at 300 random times", sample.count(30), failures)
+
+    assert not failures
+
+
+def test_in_the_debugger() -> None:
+    """A step over a MOVE that waits takes no time; it is shown; and a step back takes it back."""
+    cell = cell_of("cell1")
+    text = """MOVE ARM_1 TO g STRAIGHTLY, WITH BLEND = 0.02 ;
+    n = 7 ;
+    MOVE ARM_1 TO h STRAIGHTLY ;
+    PRINT(n) ;"""
+    debugger = Debugger(code_of(f"{FRAMES}{text} END.", cell), cell)
+    debugger.begin()
+    debugger.run_slice()
+    place = FRAMES.count("\n") + 1
+
+    def step(command: Command) -> int:
+        debugger.resume(command)
+        debugger.run_slice()
+        return debugger.code.source.line(debugger.stack()[0].span.start)
+
+    while step("next") != place:
+        pass
+    begun = debugger.time
+    assert step("next") == place + 1
+    assert debugger.time == begun
+    assert "g" in [one.value for scope in debugger.scopes((), 0) for one in scope.children() if "wait" in one.name]
+    assert step("next") == place + 2
+    assert debugger.time == begun
+    assert step("next") == place + 3
+    assert debugger.time > begun + 0.5
+    assert [step("back") for _ in range(3)] == [place + 2, place + 1, place]
+    assert debugger.time == begun
+    assert debugger.machine.state.program.ahead is None
+
+
+# ---- of the joints -------------------------------------------------------------------------------------------------
+
+
+def test_joints_go_over() -> None:
+    """MOVEs of the joints go over into one another: straight from configuration to configuration, off only near f."""
+    two = ran("MOVE ARM_1 TO g WITH BLEND = 0.03 ; n = 2 ; MOVE ARM_1 TO h ;")
+    there = ran("MOVE ARM_1 TO g ; MOVE ARM_1 TO h ;")
+    (stage,) = two.stages[1:]
+    q = stage.motion(np.linspace(0, stage.motion.duration, 4000))
+    corner = there.stages[1].motion(there.stages[1].motion.duration)
+    start, end = q[0], there.stages[2].motion(there.stages[2].motion.duration)
+
+    assert stage.stage.kind == "PTP"
+    assert stage.goal_names == ("g", "h")
+    np.testing.assert_allclose(q[-1], end, atol=1e-9)
+    off = [np.linalg.norm(line_offsets(q, a, b), axis=1) for a, b in ((start, corner), (corner, end))]
+    away = np.linalg.norm(tool(two) - G, axis=1)
+    q_of_tool = stage.motion(np.linspace(0, stage.motion.duration, 2000))
+    near = np.minimum(
+        *(np.linalg.norm(line_offsets(q_of_tool, a, b), axis=1) for a, b in ((start, corner), (corner, end)))
+    )
+    assert near[away > 0.0301].max() < 1e-9
+    assert 1e-4 < away.min() < 0.03
+    assert min(each.min() for each in off) < 1e-9
+    assert np.linalg.norm(stage.motion(stage.motion.duration / 2, 1)) > 0.1
+    assert stage.motion.duration < sum(each.motion.duration for each in there.stages[1:])
+
+
+def line_offsets(q: Array, a: Array, b: Array) -> Array:
+    """How far configurations are from the straight leg between two others."""
+    part = np.clip((q - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+    return q - (a + part[:, None] * (b - a))
+
+
+def test_joint_positions_go_over() -> None:
+    """JOINTS may be passed too, and the configuration that they ask for is kept."""
+    recording = ran("""MOVE ARM_1 TO JOINTS(20, -70, 0.45, 0, 50, 0) WITH BLEND = 0.02 ;
+    MOVE ARM_1 TO g DIRECTLY, WITH BLEND = 0.02 ; MOVE ARM_1 TO JOINTS(-20, -60, 0.4, 0, 60, 10) ;""")
+    (stage,) = recording.stages[1:]
+
+    assert len(stage.goal_names) == 3
+    expected = np.array([*np.radians([-20, -60]), 0.4, *np.radians([0, 60, 10])])
+    np.testing.assert_allclose(recording.configurations["ARM_1"], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("following", ["PAUSE 1 ; MOVE ARM_1 TO h ;", "MOVE ARM_1 TO h STRAIGHTLY ;", ""])
+def test_joints_stop(following: str) -> None:
+    """Before anything else the arm stops at the goal."""
+    recording = ran(f"MOVE ARM_1 TO g WITH BLEND = 0.02 ; {following}")
+
+    assert kinds(recording)[0] == "PTP"
+    assert recording.stages[1].goal_names == ("g",)
+    assert np.linalg.norm(tool(recording, 1)[-1] - G) < 1e-9
+
+
+def test_joints_beyond_their_limits() -> None:
+    """A configuration on the way that passes a limit is told, by the MOVE that asks for it."""
+    text = "MOVE ARM_1 TO JOINTS(0, -60, 30, 0, 60, 0) WITH BLEND = 0.02 ; MOVE ARM_1 TO h ;"
+    error = failure(f"{FRAMES} {text} END.")
+
+    assert error.diagnostic.code == "E402"
+    assert "JOINTS(0, -60, 30, 0, 60, 0)" in error.diagnostic.message
+
+
+def test_limits_of_joints(sample: Sample) -> None:
+    """Random MOVEs of the joints that go over into one another keep the limits at random times."""
+    failures = 0
+    for rng in sample.cases(30):
+        offsets = rng.uniform(-0.08, 0.08, (4, 3))
+        moves = " ; ".join(
+            f"MOVE ARM_1 TO g * XYZ({x:.4f}, {y:.4f}, {z:.4f}) WITH SPEED = 120, WITH BLEND = {rng.uniform(0.002, 0.1)}"
+            for x, y, z in offsets.tolist()
+        )
+        recording = ran(f"{moves} ;")
+        stage, limits = recording.stages[-1], recording.cell.arms["ARM_1"].arm.limits
+        t = rng.uniform(0, stage.motion.duration, 300)
+        q, qd, qdd = (stage.motion(t, order) for order in range(3))
+        failures += not (
+            (q >= limits.lower).all()
+            and (q <= limits.upper).all()
+            and (np.abs(qd) <= limits.speed * (1 + 1e-9)).all()
+            and (np.abs(qdd) <= limits.acceleration * (1 + 1e-9)).all()
+            and len(stage.goal_names) == 4
+        )
+    sample.record("MOVEs of the joints that go over, limits at 300 random times", sample.count(30), failures)
 
     assert not failures

@@ -291,7 +291,8 @@ def _motion(stage: RunStage, recording: Recording, solver: Solver, *, zones: boo
     end = motion(motion.duration)
     if not np.ptp(motion(np.linspace(0.0, motion.duration, _LOOKS)), axis=0).any():
         return [Wait(span=span, seconds=motion.duration)]
-    if planned.kind == "PTP" and stage.path is None:
+    is_one = planned.goal is None or len(planned.goal.poses) == 1
+    if planned.kind == "PTP" and is_one and stage.path is None:
         part = _speed_part(stage, solver)
         return [MoveJoints(span=span, stage=stage, q=end, duration=motion.duration, speed_part=part)]
     straight = ("LINE", "BLEND") if zones else ("LINE",)

@@ -23,11 +23,12 @@ from armwright.motion.obstruction import Cause, PathError, cause_of, check_ends
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.rounded_corners import rounded_move
+from armwright.motion.rounded_joint_path import rounded_run, rounding_within
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight import coarse_line
 from armwright.motion.through import through
 from armwright.motion.tool_limits import ToolLimits, tool_peaks
-from armwright.motion.trajectory import Trajectory, whole_ticks
+from armwright.motion.trajectory import Trajectory, hold, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
 _FARTHEST = 1e6
@@ -35,6 +36,8 @@ _FARTHEST = 1e6
 # Points of the tool along a smooth motion from which its length is summed.
 _LOOKS = 101
 
+# Configurations nearer than this are the same [rad] or [m].
+_SAME_CONFIGURATION = 1e-9
 # A joint that moves at this part of its speed limit moves at it; a speed of which this part is reached is reached.
 _AT_LIMIT, _REACHED = 0.98, 0.98
 
@@ -67,11 +70,13 @@ class StageGoal:
     """What one stage has to do.
 
     Attributes:
-        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop, ``ARC``
-            through the position of the first of two to the second.
+        kind: ``PTP`` to one pose, or past several with rounded corners; ``LINE`` to one pose; ``SPLINE`` and ``BLEND``
+            past several without a stop; ``ARC`` through the position of the first of two to the second.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
         joints: (n,) joint positions that a ``PTP`` is to end at, whose pose ``poses`` has; None for any that take it.
-        blend: how far from a corner the rounding may begin [m], one number or one for each; only for ``BLEND``.
+            Past several poses (k, n), with NaN for any.
+        blend: how far from a corner the rounding may begin [m], one number or one for each; for ``BLEND``, and for
+            ``PTP`` past several poses.
         corner: how far a ``SPLINE`` may be off the straight legs, and pass a pose [m]; None for the report's own
             X-spline through the poses.
     """
@@ -245,6 +250,9 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
     if far.max() > _FARTHEST:
         worst = int(far.argmax())
         raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
+    if goal.kind == "PTP" and len(poses) > 1:
+        yield _past_configurations(arm, q, goal, manner, number)
+        return
     if goal.kind == "PTP" and goal.joints is not None:
         for violation in violations_of(solver_of(arm).arm, goal.joints.tolist()):
             obstacle = _at_pose("limits", str(violation), 0, poses[0])
@@ -267,6 +275,31 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
         if bypass is None:
             raise StageError(number, obstacle) from error
         yield bypass
+
+
+def _past_configurations(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> PlannedStage:
+    """Return the stage on which the joints go straight from configuration to configuration, past rounded corners."""
+    points, blends = [q], np.broadcast_to(0.0 if goal.blend is None else goal.blend, len(goal.poses) - 1).tolist()
+    distances: list[float] = []
+    wanted = np.full((len(goal.poses), len(q)), np.nan) if goal.joints is None else goal.joints
+    for pose, (X, joints) in enumerate(zip(goal.poses, wanted, strict=True)):
+        try:
+            end = _configurations(arm, X, points[-1], number)[0] if np.isnan(joints).any() else joints
+        except StageError as error:
+            raise StageError(number, attrs.evolve(error.obstacle, pose=pose)) from None
+        for violation in violations_of(solver_of(arm).arm, end.tolist()):
+            obstacle = _at_pose("limits", str(violation), pose, X)
+            raise StageError(number, attrs.evolve(obstacle, joint=violation.joint))
+        # A configuration that was there before is no corner.
+        if np.abs(end - points[-1]).max() > _SAME_CONFIGURATION:
+            points.append(end)
+            distances.append(blends[pose] if pose < len(blends) else 0.0)
+    corners = np.array(points)
+    if len(corners) < 2:
+        return PlannedStage(kind="PTP", trajectory=hold(q, 0.0), length=0.0)
+    rounding = rounding_within(solver_of(arm), corners, np.array(distances[:-1]))
+    motion = rounded_run(arm, corners, rounding, manner.speed).trajectory
+    return PlannedStage(kind="PTP", trajectory=whole_ticks(motion, manner.period), length=tool_path_length(arm, motion))
 
 
 def _on_arc(arm: AnyArm, q: Array, poses: Array, manner: Manner, number: int) -> PlannedStage:

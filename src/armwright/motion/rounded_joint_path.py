@@ -17,12 +17,14 @@ from armwright.motion.joint_path import natural_speeds
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.polynomials import shifted
 from armwright.motion.quintic_polynomials import TOP_SPEED, check_speed, point_to_point
-from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.timing_law import TimedPath, timed
 from armwright.motion.trajectory import Trajectory
 
 # Intervals between knots, at least: on each the timing is refined.
 _INTERVALS = 100
+# Positions on half of a leg at which it is looked how far the tool is from the corner.
+_LOOKS = 257
 # Between two blends a leg shorter than this part of the path is rounding.
 _NO_LEG = 1e-9
 
@@ -105,6 +107,33 @@ def rounded_run(arm: AnyArm, points: Array, rounding: Array, speed: float = 100.
     motion = motion.slowed(slowing_for_limits(arm, motion)[0])
     at = [_when(run, inner) * motion.duration for inner in (times[1:-1], times[1:-1] - widths, times[1:-1] + widths)]
     return RoundedRun(motion, *at)
+
+
+def rounding_within(solver: Solver, points: Array, distances: Array) -> Array:
+    """Return how much is rounded at corners so that the tool is on a leg farther than a distance from its corner.
+
+    Args:
+        solver: the arm.
+        points: (k, n) joint positions, no two neighbours the same.
+        distances: (k - 2,) from the corner at which the rounding may begin, and end [m].
+
+    Returns:
+        (k - 2,) of the shorter leg at each inner point the part that is rounded, above 0 and at most 1.
+    """
+    lengths = (np.abs(np.diff(points, axis=0)) / natural_speeds(solver.arm, points)).max(axis=1)
+    parts = np.linspace(0.0, 0.5, _LOOKS)[:, None]
+    rounding = []
+    for corner, distance in enumerate(distances.tolist(), 1):
+        at = np.asarray(solver.forward(points[corner : corner + 1]))[0, :3, 3]
+        widths = []
+        for other in (corner - 1, corner + 1):
+            q = points[corner] + parts * (points[other] - points[corner])
+            away = np.linalg.norm(np.asarray(solver.forward(q))[:, :3, 3] - at, axis=1)
+            farther = np.flatnonzero(away > distance)
+            last = parts[max(int(farther[0]) - 1, 1) if len(farther) else -1, 0]
+            widths.append(float(last) * lengths[min(corner, other)])
+        rounding.append(2 * min(widths) / min(lengths[corner - 1 : corner + 1]))
+    return np.asarray(np.minimum(np.array(rounding), 1.0))
 
 
 def _finer(path: Trajectory) -> Trajectory:

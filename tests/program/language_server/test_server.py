@@ -394,9 +394,23 @@ async def test_completion_in_a_move(editor: Editor) -> None:
     assert "n" not in places
     clauses = await offered("MOVE ARM_1 TO cup ")
     assert {"DIRECTLY", "STRAIGHTLY", "VIA", "ON", "WITH APPROACH", "WITH SPEED"} <= set(clauses)
-    assert "WITH BLEND" not in clauses
-    assert await offered("MOVE ARM_1 TO cup DIRECTLY, ") == ["ON", "WITH SPEED", "WITH DURATION"]
-    assert await offered("MOVE ARM_1 TO cup VIA (above), WITH SPEED = 5, WITH ") == ["APPROACH", "DEPARTURE", "BLEND"]
+    assert {"CIRCULARLY", "WITH BLEND", "WITH VELOCITY"} <= set(clauses)
+    assert await offered("MOVE ARM_1 TO cup DIRECTLY, ") == [
+        "ON",
+        "WITH SPEED",
+        "WITH BLEND",
+        "WITH DURATION",
+        "WITH VELOCITY",
+        "WITH ROTATION",
+        "WITH ACCELERATION",
+    ]
+    assert await offered("MOVE ARM_1 TO cup VIA (above), WITH SPEED = 5, WITH ") == [
+        "APPROACH",
+        "DEPARTURE",
+        "BLEND",
+        "ROTATION",
+        "ACCELERATION",
+    ]
     assert (await offered("MOVE ARM_1 TO cup WITH SPEED = "))[:4] == ["n", "DIST", "FORCE", "TORQUE"]
     assert await offered("OPERATE ") == ["LAMP"]
     assert {"MOVE", "put", "n", "MOVE ... WITH APPROACH", "TRY ... RECOVER"} <= set(await offered("M"))

@@ -232,6 +232,7 @@ class Form:
         straight: one straight line.
         blend: whether the corners at via points are rounded.
         circular: one arc through what lies on the way.
+        jointwise: the joints go straight from one configuration to the next, and past what lies on the way.
     """
 
     goal: str
@@ -241,6 +242,7 @@ class Form:
     straight: bool = False
     blend: bool = False
     circular: bool = False
+    jointwise: bool = False
 
     @property
     def direct(self) -> bool:
@@ -267,6 +269,7 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
         stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.departure,)))
     end = form.approach or form.goal
     past = MotionKind.ARC if form.circular else MotionKind.BLEND if form.blend else MotionKind.SPLINE
+    past = MotionKind.PTP if form.jointwise else past
     gross = past if form.via else MotionKind.LINE if form.straight else MotionKind.PTP
     stages.append(StagePlan(kind=gross, frames=(*form.via, end)))
     if form.approach:

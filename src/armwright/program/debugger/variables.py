@@ -240,6 +240,9 @@ def _run_variables(machine: Machine, process: Process) -> Iterable[Variable]:
     devices = ", ".join(map(machine.spelling, sorted(machine.hardware.active_devices())))
     yield Variable(name="devices on", value=devices or "none")
     yield Variable(name="arm used last", value=process.last_arm or "none")
+    if process.ahead is not None:
+        waiting = ", ".join(request.form.goal for request in process.ahead.requests)
+        yield Variable(name="MOVEs that wait for the next", value=waiting)
     if process.message:
         yield Variable(name="message", value=f'"{process.message}"')
     yield Variable(name="priority", value=f"{process.priority:g}")

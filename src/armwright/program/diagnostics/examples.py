@@ -7,6 +7,7 @@ grip ; END.`` has the text of a module. ``// run in one_arm`` has the program ru
 with ``// around: via``, ``// limits: steps 1000`` and ``// physics`` as on the command line; ``// effort: 60 in joint
 2`` makes a joint of its arms that weak. ``// export urscript`` has its motion exported afterwards, by
 ``armwright.export``, and ``// export urscript program`` the program.
+``// cell: joints ARM_1 RRPRRR`` tells which joints turn and which slide, ``targets HOME of ARM_1`` of joint targets.
 """
 
 import re

@@ -176,24 +176,24 @@ def _check_joints(state: FlowState, goal: tree.Function, arm: str | None) -> Non
         if cell.targets is not None and name.key not in cell.targets:
             note = f"joint targets of the cell: {', '.join(sorted(cell.targets)) or 'none'}"
             text, advice = f"the cell has no joint target `{name.text}`", did_you_mean(closest(name.text, cell.targets))
-            state.report("E242", text, name.span, "no such joint target", note=note, advice=advice)
+            state.report("E246", text, name.span, "no such joint target", note=note, advice=advice)
         elif cell.targets is not None and cell.targets[name.key] != arm:
             text = f"joint target `{name.text}` is one of {cell.targets[name.key]}, not of {arm}"
-            state.report("E242", text, name.span, "of another arm")
+            state.report("E246", text, name.span, "of another arm")
         return
     joints = cell.joints.get(arm)
     if joints is None or not goal.arguments:
         return
     if len(joints) != len(goal.arguments):
         text = f"{arm} has {counted(len(joints), 'joint')}, but JOINTS is given {len(goal.arguments)}"
-        state.report("E242", text, goal.span, f"expected {len(joints)} positions")
+        state.report("E246", text, goal.span, f"expected {len(joints)} positions")
         return
     for number, (argument, letter) in enumerate(zip(goal.arguments, joints, strict=True), 1):
         if isinstance(argument, tree.Number) and argument.unit is not None:
             kind, verb = ("angle", "turns") if letter == "R" else ("length", "slides")
             if dimension(argument.unit) != kind:
                 text = f"joint {number} of {arm} {verb}, but `{argument.text}` is no {kind}"
-                state.report("E242", text, argument.span, f"expected {'an' if kind == 'angle' else 'a'} {kind}")
+                state.report("E246", text, argument.span, f"expected {'an' if kind == 'angle' else 'a'} {kind}")
 
 
 def _check_speed(state: FlowState, node: tree.Expression) -> None:

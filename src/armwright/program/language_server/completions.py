@@ -85,12 +85,12 @@ _CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAU
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
-    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
     "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
     "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
     "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
     **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
-    "BLEND": frozenset(("DIRECTLY", "CIRCULARLY")),
+    "BLEND": frozenset(("CIRCULARLY",)),
     "SPEED": frozenset(("DURATION", "VELOCITY")),
     "DURATION": frozenset(("SPEED", "VELOCITY")),
     "VELOCITY": frozenset(("SPEED", "DURATION")),
@@ -264,8 +264,6 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
         last = word.rpartition(" ")[2]
         # The action of ON has ended before the position, or starts after it.
         if last in _CLAUSES and (last in written or _EXCLUDES.get(last, frozenset()) & written):
-            continue
-        if last == "BLEND" and not {"VIA", "STRAIGHTLY"} & written:
             continue
         if last in allowed and (word != "RETRY" or expected.is_in_recovery):
             yield word

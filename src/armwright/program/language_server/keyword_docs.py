@@ -111,7 +111,7 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "BLEND": (
         "WITH BLEND = distance",
-        "Rounds the corners at via points within this distance, or that from a MOVE STRAIGHTLY to the next one.",
+        "Rounds the corners at via points within this distance, or that from one MOVE to the next.",
     ),
     "DURATION": ("WITH DURATION = seconds", "The duration of the motion, instead of a speed."),
     "VELOCITY": (

@@ -89,7 +89,7 @@ def result_type(
     key, signature = node.name.key, FUNCTIONS[node.name.key]
     if key == JOINTS:
         text, advice = "JOINTS is no value: it says where a MOVE ends", "write `MOVE ARM_1 TO JOINTS(...)`"
-        names.report("E241", text, node.span, "not the goal of a MOVE", advice=advice)
+        names.report("E245", text, node.span, "not the goal of a MOVE", advice=advice)
         return None
     required = f"{key} takes {signature.parameters}"
     given = len(node.arguments)

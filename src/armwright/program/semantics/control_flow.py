@@ -122,7 +122,7 @@ def when(context: Context, node: tree.When) -> None:
     if name is not None:
         if (first := context.watches.get(name.key)) is not None:
             text, here = f"`{name.text}` is the name of two WHENs", labels(first.head, "first")
-            names.report("E261", text, name.span, "second", secondary=here, advice="give this one another name")
+            names.report("E241", text, name.span, "second", secondary=here, advice="give this one another name")
         context.watches[name.key] = node
     outside, context.interrupting = context.interrupting, True
     context.check_with(node.action, recovering=False)
@@ -139,7 +139,7 @@ def watch_switch(context: Context, node: tree.WatchSwitch) -> None:
         advice = (
             did_you_mean(near) or f"write `WHEN {name.text} : condition DO ...` before, in this block or one around it"
         )
-        names.report("E262", f"no WHEN here is called `{name.text}`", name.span, "not known here", advice=advice)
+        names.report("E242", f"no WHEN here is called `{name.text}`", name.span, "not known here", advice=advice)
 
 
 def interrupted_move(context: Context, node: tree.Brake | tree.Resume) -> None:
@@ -150,7 +150,7 @@ def interrupted_move(context: Context, node: tree.Brake | tree.Resume) -> None:
             f"{word} is outside of the action of a WHEN",
             f"write `WHEN condition DO BEGIN ... {word} ... END`",
         )
-        context.names.report("E263", text, node.span, "which MOVE?", note=note, advice=advice)
+        context.names.report("E243", text, node.span, "which MOVE?", note=note, advice=advice)
 
 
 def lock(context: Context, node: tree.Lock) -> None:

@@ -18,7 +18,6 @@ _CONFLICTS_WITH_DIRECTLY: dict[type, tuple[str, str]] = {
     tree.Via: ("via points given here", "allows no via points"),
     tree.Approach: ("approach point given here", "allows no approach point"),
     tree.Departure: ("departure point given here", "allows no departure point"),
-    tree.Blend: ("rounded corners asked for here", "has no corners"),
 }
 SPEED_NOTE = "100 is the normal speed and 120 the maximum of the arm"
 
@@ -74,7 +73,7 @@ _CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Appro
 def _check_guard_place(names: NameResolver, node: tree.Move, head: Span) -> None:
     """Report a guard of a MOVE that goes over into the next one."""
     kinds = {type(clause): clause for clause in node.clauses}
-    if tree.Blend in kinds and tree.Straightly in kinds and tree.Via not in kinds:
+    if tree.Blend in kinds and tree.Via not in kinds:
         text, here = (
             "a MOVE that goes over into the next one has no guard",
             labels(kinds[tree.Blend].span, "BLEND here"),
@@ -87,19 +86,19 @@ def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> 
     """Check a goal that is given by joint positions: what goes to it, and how."""
     if joint_target(names.scope, goal) is None:
         if not goal.arguments:
-            names.report("E242", "JOINTS takes a position for each joint", goal.span, "no positions here")
+            names.report("E246", "JOINTS takes a position for each joint", goal.span, "no positions here")
         for argument in goal.arguments:
             require_type(names, argument, ExpressionType.SCALAR, "E216", "a joint position is a number")
     if not isinstance(node.moved, tree.ArmName | tree.Poison):
         text = f"JOINTS is a goal for an arm, not for {quote_expression(node.moved)}"
         advice = "move the arm that carries it"
-        names.report("E241", text, node.moved.span, "this is not an arm", advice=advice)
+        names.report("E245", text, node.moved.span, "this is not an arm", advice=advice)
     for clause in node.clauses:
         if isinstance(clause, _CONFLICTS_WITH_JOINTS):
             word = tree.clause_word(type(clause))
             text, here = f"{word} cannot be combined with JOINTS", labels(goal.span, "joint positions given here")
             advice = "let one MOVE go to a frame, and the next to JOINTS"
-            names.report("E241", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
+            names.report("E245", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
 
 
 def _check_speed(names: NameResolver, node: tree.Expression) -> None:
@@ -151,17 +150,17 @@ def _check_arc(names: NameResolver, circular: tree.Clause, first: dict[type, tre
     via = first.get(tree.Via)
     if not isinstance(via, tree.Via):
         advice = "write `CIRCULARLY, VIA (f)` with a frame on the arc"
-        names.report("E243", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
+        names.report("E247", "CIRCULARLY needs a frame to pass", circular.span, "an arc through what?", advice=advice)
     elif len(via.points) > 1:
         text, here = f"an arc passes one frame, not {len(via.points)}", labels(circular.span, "an arc asked for here")
         advice = "write one `MOVE ... CIRCULARLY` for each arc"
-        names.report("E243", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
+        names.report("E247", text, via.span, f"{len(via.points)} frames", secondary=here, advice=advice)
     for kind in (tree.Straightly, tree.Approach, tree.Departure, tree.Blend):
         if clause := first.get(kind):
             text = f"CIRCULARLY cannot be combined with {tree.clause_word(kind)}"
             here = labels(circular.span, "requests one arc")
             advice = "write a MOVE for the arc, and one for each other leg"
-            names.report("E243", text, clause.span, "another way", secondary=here, advice=advice)
+            names.report("E247", text, clause.span, "another way", secondary=here, advice=advice)
 
 
 def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
@@ -176,17 +175,15 @@ def _check_paths(names: NameResolver, first: dict[type, tree.Clause]) -> None:
             here = labels(straight.span, "requests one straight line")
             advice = "write one `MOVE ... STRAIGHTLY` for each leg"
             names.report("E209", f"STRAIGHTLY {combined}", clause.span, label, secondary=here, advice=advice)
-    if blend and not direct and tree.Via not in first and tree.Circularly not in first:
-        _check_going_over(names, blend, straight, first)
+    if blend and tree.Via not in first and tree.Circularly not in first:
+        _check_going_over(names, blend, first)
 
 
-def _check_going_over(
-    names: NameResolver, blend: tree.Clause, straight: tree.Clause | None, first: dict[type, tree.Clause]
-) -> None:
-    """Check a BLEND without VIA: a MOVE goes over into the next one only on a straight line."""
-    if straight is None:
+def _check_going_over(names: NameResolver, blend: tree.Clause, first: dict[type, tree.Clause]) -> None:
+    """Check a BLEND without VIA: a MOVE of one stage goes over into the next one."""
+    if tree.Approach in first or tree.Departure in first:
         text = "BLEND rounds the corners at via points, but there is no VIA"
-        advice = "add `VIA ( ... )`, or STRAIGHTLY to go over into the next MOVE, or leave BLEND out"
+        advice = "add `VIA ( ... )`, or write a MOVE for each leg, which goes over into the next one"
         names.report("E226", text, blend.span, "no corners to round", advice=advice)
     elif (duration := first.get(tree.Duration)) is not None:
         text = "a MOVE that goes over into the next one has no DURATION of its own"

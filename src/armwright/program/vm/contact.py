@@ -61,7 +61,8 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     last = runs[-1]
     stop = braked(arm, last.trajectory, local, period=period)
     braking, motion.stopped = stop.trajectory, StoppedOn(last.trajectory, stop.reached)
-    tau = trajectory_efforts(arm, braking, period, _send_and_watch(machine, motion, braking))
+    loaded = machine.loaded_arm(motion.arm)
+    tau = trajectory_efforts(loaded, braking, period, _send_and_watch(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
     if motion.stage_index >= 0:
@@ -97,22 +98,23 @@ def _record_wrenches(machine: Machine, arm: str) -> ToolWrenches:
 
 
 def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> None:
-    """Work out anew what the motors of an arm give from now on: what it pressed with may have been released.
+    """Work out anew what the motors of an arm give from now on: what it pressed with, or held, may be released.
 
     Args:
         machine: that runs the program.
         arm: its name.
         stage_index: number of the stage that it is on; None where it is on none.
     """
-    if not any(push.wrenches.any() for push in machine.state.tool_wrenches[arm]):
+    presses = any(push.wrenches.any() for push in machine.state.tool_wrenches[arm])
+    if not (presses or machine.cell.parts) or not machine.state.segments[arm]:
         return
     push, period, last = _record_wrenches(machine, arm), machine.cell.period, machine.state.segments[arm][-1]
     done_ticks = round((machine.now - last.t0) / period)
     if last.tau is None or done_ticks >= len(last.tau):
         return
     remaining_wrenches = ToolWrenches(last.t0, np.concatenate([np.zeros((done_ticks, 6)), push.wrenches]))
-    model = machine.cell.arms[arm].arm
-    tau = trajectory_efforts(model, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
+    loaded = machine.loaded_arm(arm)
+    tau = trajectory_efforts(loaded, last.trajectory, period, remaining_wrenches, len(last.tau) - 1)
     tau[:done_ticks] = last.tau[:done_ticks]
     machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
     if stage_index is not None:

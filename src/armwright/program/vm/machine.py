@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, TypeAlias
 import attrs
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree
 from armwright.cell.hardware import Hardware, SimulatedHardware
+from armwright.cell.loads import loaded_arm, loads_over_time
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward_kinematics import forward
@@ -124,9 +126,16 @@ class Machine:
         # What goes wrong while the arms come to rest is of no program any more.
         while self.hardware.advance(self.now) is not None:
             pass
+        tracks = self.hardware.part_poses().tracks if cell.parts else {}
         streams = tuple(
             sample_stream(
-                name, arm, state.segments[name], state.tool_wrenches[name], end_tick=state.ticks, period=cell.period
+                name,
+                arm,
+                state.segments[name],
+                state.tool_wrenches[name],
+                end_tick=state.ticks,
+                period=cell.period,
+                loads=loads_over_time(cell, name, tracks),
             )
             for name, arm in cell.arms.items()
         )
@@ -271,6 +280,13 @@ class Machine:
     def carrier(self, name: str) -> str | None:
         """Return the arm that a frame is or hangs on; None where it hangs on none."""
         return next((frame for frame in (name, *self.state.tree.ancestors(name)) if is_arm(frame)), None)
+
+    def loaded_arm(self, name: str) -> Arm:
+        """Return the model of an arm with the parts that it holds now."""
+        if not self.cell.parts:
+            return self.cell.arms[name].arm
+        parts = self.hardware.part_poses()
+        return loaded_arm(self.cell, name, [(part, parts.pose(part)) for part in parts.held_by(name)])
 
     def moving_process(self, arm: str) -> Process | None:
         """Return the process that moves an arm; None where the arm is at rest."""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NoReturn
 
 import attrs
@@ -9,10 +10,12 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
+from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import IncapableArmError, counted
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.arc import FlatArcError
 from armwright.motion.plan import Manner, Obstacle, PlannedStage, StageError, StageGoal, plan
+from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import (
     MOVE_PARTS,
@@ -84,11 +87,18 @@ def _put_ahead(machine: Machine, process: Process, ahead: MovesAhead, request: M
         return
     arm, goal = ahead.arm, request.goals[request.form.goal]
     X_BW, X_MH = inverse(machine.base_pose(arm)), inverse(machine.state.tree.relation(moved, arm))
-    X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
-    # What its operand names may be another thing when the MOVE begins.
-    goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    joints = _goal_joints(machine, process, request, arm)
+    if joints is None:
+        X_BH = X_BW @ _goal_pose(machine, process, goal) @ X_MH
+        # What its operand names may be another thing when the MOVE begins.
+        goal = goal._replace(operand=machine.variable_name(process, goal.operand) or "")
+    else:
+        X_BH = forward(machine.cell.arms[arm].arm, joints)
+        goal = goal._replace(operand="")
     request = request._replace(goals={request.form.goal: goal})
-    ahead = attrs.evolve(ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH))
+    ahead = attrs.evolve(
+        ahead, requests=(*ahead.requests, request), poses=(*ahead.poses, X_BH), joints=(*ahead.joints, joints)
+    )
     if goes_over(request):
         process.ahead = ahead
         # What is worked out before the arm is there takes it for being there.
@@ -102,7 +112,7 @@ def begin_moves_ahead(machine: Machine, process: Process, ahead: MovesAhead) -> 
     """Begin the MOVEs that have waited for the next one, as one path that stops at its end."""
     process.ahead = None
     machine.update_hand_pose(ahead.arm, ahead.requests[0].span)
-    request = merged(ahead.requests, ahead.poses)
+    request = merged(ahead)
     _begin_move(machine, process, request, ahead.arm, ahead.moved, implied=ahead.implied_affix)
 
 
@@ -278,7 +288,7 @@ def _plan_stages(
         StageGoal(
             kind=legs.kind.value,
             poses=np.stack([pose(label) for label in legs.frames]),
-            joints=joints if request.form.goal in legs.frames else None,
+            joints=_stage_joints(request, joints, legs.frames, cell_arm.arm.n),
             blend=request.blend,
             corner=corner if legs.kind is MotionKind.SPLINE else None,
         )
@@ -288,7 +298,7 @@ def _plan_stages(
         speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
     )
     try:
-        stages = plan(planning_arm(cell_arm.arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
+        stages = plan(_planner(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except FlatArcError as error:
@@ -301,6 +311,22 @@ def _plan_stages(
     if request.duration is not None:
         stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
+
+
+def _planner(machine: Machine, arm: str) -> AnyArm:
+    """Return what a MOVE is planned with: the functions of the arm, and the efforts of what it holds as well."""
+    own, loaded = machine.cell.arms[arm].arm, machine.loaded_arm(arm)
+    if loaded is own:
+        return planning_arm(own)
+    return solver_of(planning_arm(own))._replace(arm=loaded, inverse_dynamics=partial(inverse_dynamics, loaded))
+
+
+def _stage_joints(request: MoveRequest, joints: Array | None, frames: Sequence[str], count: int) -> Array | None:
+    """Return the joint positions that a stage goes to, (n,) or past several frames (k, n); None for none."""
+    if not request.fixed_joints:
+        return joints if request.form.goal in frames else None
+    rows = np.array([request.fixed_joints.get(label, np.full(count, np.nan)) for label in frames])
+    return rows if len(frames) > 1 else rows[0]
 
 
 def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: str) -> Array | None:
@@ -317,14 +343,14 @@ def _goal_joints(machine: Machine, process: Process, request: MoveRequest, arm: 
         if asked not in targets:
             known = [f"joint targets of the cell: {', '.join(sorted(targets)) or 'none'}"]
             text = f"the cell has no joint target `{machine.spelling(asked)}`"
-            raise machine.error(process, "E242", text, span, "no such joint target", notes=known)
+            raise machine.error(process, "E246", text, span, "no such joint target", notes=known)
         if targets[asked].arm != arm:
             text = f"joint target `{machine.spelling(asked)}` is one of {targets[asked].arm}, not of {arm}"
-            raise machine.error(process, "E242", text, span, "of another arm")
+            raise machine.error(process, "E246", text, span, "of another arm")
         return targets[asked].q
     if len(asked) != model.n:
         text = f"{arm} has {counted(model.n, 'joint')}, but JOINTS is given {len(asked)}"
-        raise machine.error(process, "E242", text, span, f"expected {model.n} positions")
+        raise machine.error(process, "E246", text, span, f"expected {model.n} positions")
     units = machine.code.units
     return np.asarray(np.where(model.revolute, units.radians, units.metres) * np.array(asked))
 
@@ -409,7 +435,7 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     if motion.stage_index >= 0:
         record_contact(machine, motion)
     push = send_trajectory(machine, motion, trajectory)
-    tau = trajectory_efforts(arm, trajectory, period, push, counted)
+    tau = trajectory_efforts(machine.loaded_arm(motion.arm), trajectory, period, push, counted)
     update_depth_alarm(machine, motion)
     touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):

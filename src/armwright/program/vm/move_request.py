@@ -39,7 +39,8 @@ class Goal(NamedTuple):
 class MoveRequest(NamedTuple):
     """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is.
 
-    Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm.
+    Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm, and
+    ``fixed_joints`` the joint positions (n,) there, where JOINTS asks for some.
     """
 
     begin: Instruction
@@ -53,6 +54,7 @@ class MoveRequest(NamedTuple):
     joints: Sequence[float] | str | None = None
     tool: ToolLimits | None = None
     fixed: Mapping[str, Array] = MappingProxyType({})
+    fixed_joints: Mapping[str, Array] = MappingProxyType({})
 
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from armwright.arrays import Array
@@ -30,36 +28,43 @@ def is_done_at_once(process: Process, step: Instruction) -> bool:
 
 def goes_over(request: MoveRequest) -> bool:
     """Whether a MOVE goes over into the next one."""
-    return request.blend is not None and not request.form.via
+    return request.blend is not None and _is_one_stage(request)
 
 
 def fits(ahead: MovesAhead, request: MoveRequest, moved: str) -> bool:
-    """Whether a MOVE goes on from those that wait for it: another line, of the same thing, at the same speed."""
+    """Whether a MOVE goes on from those that wait for it: in the same way, of the same thing, at the same speed."""
     first = ahead.requests[0]
-    is_line = request.form.straight and not request.guards and request.duration is None
+    is_alike = _is_one_stage(request) and request.form.straight is first.form.straight
     is_same = (moved, request.speed, request.tool) == (ahead.moved, first.speed, first.tool)
-    return is_line and is_same and len(ahead.requests) < MOST_AHEAD
+    return is_alike and is_same and len(ahead.requests) < MOST_AHEAD
 
 
-def merged(requests: Sequence[MoveRequest], poses: Sequence[Array]) -> MoveRequest:
-    """Return MOVEs as one, which goes past the goals of all but the last.
+def _is_one_stage(request: MoveRequest) -> bool:
+    """Whether a MOVE is one LINE or one PTP, whose end nothing but its goal tells."""
+    return (request.form.straight or request.form.direct) and not request.guards and request.duration is None
 
-    Args:
-        requests: the MOVEs, each STRAIGHTLY.
-        poses: (4, 4) the pose of the tool at the goal of each, in the base.
-    """
+
+def merged(ahead: MovesAhead) -> MoveRequest:
+    """Return MOVEs that wait for one another as one, which goes past the goals of all but the last."""
+    requests = ahead.requests
     goals: dict[str, Goal] = {}
     fixed: dict[str, Array] = {}
-    for request, pose in zip(requests, poses, strict=True):
+    fixed_joints: dict[str, Array] = {}
+    for request, pose, joints in zip(requests, ahead.poses, ahead.joints, strict=True):
         goal = request.goals[request.form.goal]
         label = goal.label
         while label in goals:
             label += "'"
         goals[label], fixed[label] = goal._replace(label=label), pose
+        if joints is not None:
+            fixed_joints[label] = joints
     *past, last = goals
+    straight = requests[0].form.straight
     return requests[-1]._replace(
-        form=Form(goal=last, via=tuple(past), blend=bool(past), straight=not past),
+        form=Form(goal=last, via=tuple(past), blend=bool(past), straight=straight and not past, jointwise=not straight),
         goals=goals,
         blend=np.array([request.blend for request in requests[:-1]]) if past else None,
+        joints=None,
         fixed=fixed,
+        fixed_joints=fixed_joints,
     )

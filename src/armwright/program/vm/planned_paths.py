@@ -103,7 +103,8 @@ def _is_free(stages: Sequence[PlannedStage], number: int) -> bool:
 
 def can_be_passed(collision: Collision, stage: PlannedStage) -> bool:
     """Whether a path past what a stage runs into may be planned."""
-    return stage.kind == "PTP" and not (collision.at_start or collision.at_rest)
+    is_one = stage.goal is None or len(stage.goal.poses) == 1
+    return stage.kind == "PTP" and is_one and not (collision.at_start or collision.at_rest)
 
 
 def _goals(machine: Machine, arm: str, old: Trajectory, *, last: bool) -> Array:

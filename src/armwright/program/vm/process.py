@@ -323,6 +323,7 @@ class MovesAhead:
         moved: the frame that shall come to the goals.
         requests: what they ask for, in order.
         poses: (4, 4) pose of the tool at the goal of each, in the base of the arm.
+        joints: (n,) joint positions at the goal of each; None where it is a frame.
         implied_affix: whether what is moved hangs on the arm only since the first of them.
     """
 
@@ -330,6 +331,7 @@ class MovesAhead:
     moved: str
     requests: tuple[MoveRequest, ...] = ()
     poses: tuple[Array, ...] = ()
+    joints: tuple[Array | None, ...] = ()
     implied_affix: bool = False
 
 

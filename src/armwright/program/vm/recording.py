@@ -289,6 +289,7 @@ def sample_stream(
     *,
     end_tick: int,
     period: float,
+    loads: Sequence[tuple[float, Arm]],
 ) -> Stream:
     """Sample what an arm does at every servo tick.
 
@@ -299,6 +300,7 @@ def sample_stream(
         tool_wrenches: in order; each counts until the next.
         end_tick: the last of the whole run.
         period: of the servo [s].
+        loads: the arm with what it held, each with the time from which on that was so [s].
     """
     arm, ticks = cell_arm.arm, end_tick + 1
     q = np.empty((ticks, arm.n))
@@ -323,8 +325,10 @@ def sample_stream(
     for push in tool_wrenches:
         begin = round(push.t0 / period)
         wrench[begin:] = push.sample(max(ticks - begin, 0))
-    missing = np.flatnonzero(~is_known)
-    tau[missing] = _efforts(arm, (q[missing], qd[missing], qdd[missing]), wrench[missing])
+    begins = [round(time / period) for time, _ in loads]
+    for (_, loaded), begin, end in zip(loads, begins, [*begins[1:], ticks], strict=True):
+        missing = begin + np.flatnonzero(~is_known[begin:end])
+        tau[missing] = _efforts(loaded, (q[missing], qd[missing], qdd[missing]), wrench[missing])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
