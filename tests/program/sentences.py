@@ -19,6 +19,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
     "WITHIN": ("WITHIN", "within"),
+    "TIMER": ("TIMER", "timer"),
     "WHEN": ("WHEN", "when"),
     "BRAKE": ("BRAKE", "brake"),
     "RESUME": ("RESUME", "resume"),

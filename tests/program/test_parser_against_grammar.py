@@ -54,6 +54,7 @@ WORDS = {
         "when",
         "brake",
         "resume",
+        "timer",
     ),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),
     "STRING": ('""', '"seated"', '"a; b { c"'),

@@ -36,7 +36,7 @@ _LOOKS = 65
 _PART_OF_LEG = 0.4
 _SWITCHING = ("OPEN", "GRASP", "OPERATE")
 # What takes no part in an export: it changes frames, or orders the branches of a program.
-_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "END")
+_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "TIMER", "END")
 
 _Event: TypeAlias = tuple[float, float, Effect, tuple[RunStage, ...]]
 

@@ -23,7 +23,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.vm.value_text import value_text
 
 # Words that a statement can start with and that a word of the same statement is looked up by.
-_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE", "WHEN"))
+_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE", "WHEN", "TIMER"))
 
 
 # What something is, as the language would write it; and what there is to say about it, a sentence or fact each.
@@ -92,6 +92,13 @@ def _statement_word(analysis: Analysis, token: Token) -> str:
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
+# Names that are not declared and are of no cell.
+_UNDECLARED = {
+    NameKind.WATCH: "the name of a WHEN, by which it is armed and disarmed",
+    NameKind.TIMER: "a timer: TIMER starts, stops and sets it, and TIMER(name) are its seconds",
+}
+
+
 def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
     key, text = occurrence.key, analysis.text[occurrence.start : occurrence.end]
     procedure = analysis.compiled.symbols.procedures.get(key)
@@ -111,8 +118,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.ERROR:
             own = "a kind of error of the program, which RAISE raises and RECOVER may name"
             description = text, [f"a kind of error: {KINDS[key]}" if key in KINDS else own]
-        case NameKind.WATCH:
-            description = text, ["the name of a WHEN, by which it is armed and disarmed"]
+        case NameKind.WATCH | NameKind.TIMER:
+            description = text, [_UNDECLARED[occurrence.kind]]
         case NameKind.AXIS:
             description = key, [f"the {key.lower()} axis"]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:

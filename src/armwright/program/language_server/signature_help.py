@@ -20,6 +20,7 @@ _PARAMETERS = {
     "TEXT": ("value",),
     **dict.fromkeys(WITH_INPUT, ("input",)),
     **dict.fromkeys(("OUTPUT", "SETTING"), ("device",)),
+    "TIMER": ("timer",),
     "RPY": ("roll", "pitch", "yaw"),
     "ROT": ("x", "y", "z", "angle"),
     **dict.fromkeys(MEASURES, ("pose",)),

@@ -9,7 +9,7 @@ import attrs
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_DEVICE
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_KEY
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -34,6 +34,7 @@ class NameKind(enum.Enum):
     VALUE = "value of the language"
     ERROR = "kind of error"
     WATCH = "name of a WHEN"
+    TIMER = "timer"
     UNKNOWN = "unknown name"
 
 
@@ -99,6 +100,14 @@ def scope_extents(symbols: Symbols) -> ScopeExtents:
     return ScopeExtents(starts, scopes)
 
 
+# What a name behind these words is.
+_NAMED = {
+    **dict.fromkeys(("OPERATE", "PULSE"), NameKind.DEVICE),
+    "TIMER": NameKind.TIMER,
+    "WHEN": NameKind.WATCH,
+}
+
+
 def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurrence, ...]:
     """Return the names among some tokens.
 
@@ -126,8 +135,9 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
                 name.writes = next_key == "=" or (next_key == "[" and _is_assigned(tokens, index + 1))
             elif previous == "(" and key in AXES and index > 1 and tokens[index - 2].key in WITH_AXIS:
                 name.kind, name.owner, name.type = NameKind.AXIS, None, None
-            elif previous == "(" and index > 1 and tokens[index - 2].key in WITH_DEVICE and next_key == ")":
-                name.kind, name.owner, name.type = NameKind.DEVICE, None, None
+            elif previous == "(" and index > 1 and tokens[index - 2].key in WITH_KEY and next_key == ")":
+                is_timer = tokens[index - 2].key == "TIMER"
+                name.kind, name.owner, name.type = NameKind.TIMER if is_timer else NameKind.DEVICE, None, None
         elif kind is _KEYWORD or key in (";", ")"):
             in_units = key == "UNITS"
             in_recover = key == "RECOVER"
@@ -150,9 +160,8 @@ def _classify_name(token: Token, scope: Scope, previous: str, next_key: str, *, 
     phrase = statement_phrase(previous, key, next_key)
     if phrase or (previous == "READ" and key in SENSORS):
         return Occurrence(start, end, phrase or key, NameKind.SENSOR)
-    is_watch = previous == "WHEN" and next_key in (":", "ON", "OFF")
-    if is_watch or previous in ("OPERATE", "PULSE"):
-        return Occurrence(start, end, key, NameKind.WATCH if is_watch else NameKind.DEVICE)
+    if previous in _NAMED and (previous != "WHEN" or next_key in (":", "ON", "OFF")):
+        return Occurrence(start, end, key, _NAMED[previous])
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)
     return _classify_variable(token, scope)
