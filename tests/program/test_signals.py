@@ -10,6 +10,7 @@ from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
 from armwright.cell.signals import Input, Wiring
 from armwright.cell.simulator import Simulator
+from armwright.physics.world import PhysicsCell
 from armwright.program import Source, compile as translate, run as run_program
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.vm.interpreter import interpret
@@ -277,3 +278,27 @@ def test_timers_gone_back() -> None:
     step(debugger, "back")
 
     assert [*shown, debugger.evaluate("TIMER(a)").value] == ["7", "0.3"]
+
+
+def test_inputs_in_physics() -> None:
+    """In a cell with physics inputs change by their timeline, their device, their event and their switch alike."""
+    text = """VAR n : SCALAR ; ready : EVENT ;
+    BEGIN
+      FOR n = 0 TO 2 DO BEGIN PRINT(INPUT(door), ANALOG(level)) ; PAUSE 0.25 END ;
+      OPERATE press ON ; n = TIME ; WAIT UNTIL INPUT(pressed) ; PRINT(TIME - n) ;
+      SIGNAL ready ; PRINT(INPUT(asked), INPUT(begun)) ; PAUSE 0.1 ; PRINT(INPUT(asked), INPUT(begun)) ;
+      WAIT UNTIL INPUT(switch) ; PRINT(TIME) ;
+      WHEN NOT INPUT(switch) DO BEGIN BRAKE ; PRINT(TIME) ; RESUME END ;
+      MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.05) WITH SPEED = 20 ;
+    END."""
+    cell = signals_cell(SWITCH=Input())
+    code, spoken = code_of(text, cell), []
+    for kind in (PhysicsCell, Simulator):
+        hardware = kind(cell)
+        hardware.set_input("SWITCH", 1.0, 1.4)
+        hardware.set_input("SWITCH", 0.0, 1.6)
+        spoken.append(printed(interpret(code, cell, hardware)))
+
+    assert spoken[0][:7] == ["true -1", "true -1", "false 2.5", "0.25", "true true", "false true", "1.4"]
+    assert float(spoken[0][7]) > 1.6
+    assert spoken[0] == spoken[1]
