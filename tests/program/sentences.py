@@ -23,6 +23,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "TOOLKEY": ("VELOCITY", "rotation", "Acceleration"),
     "CIRCULARLY": ("CIRCULARLY", "circularly"),
     "WITHIN": ("WITHIN", "within"),
+    "TIMER": ("TIMER", "timer"),
     "WHEN": ("WHEN", "when"),
     "BRAKE": ("BRAKE", "brake"),
     "RESUME": ("RESUME", "resume"),

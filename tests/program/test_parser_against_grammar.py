@@ -58,6 +58,7 @@ WORDS = {
         "when",
         "brake",
         "resume",
+        "timer",
     ),
     "DOTTED": ("grip.take", "f.g.h"),
     "NUMBER": ("0", "1", "12", "0.5", "1e3", "120mm", "2.5CM", "90deg", "3s"),

@@ -38,6 +38,8 @@ BEGIN
   TRY RAISE jam WITH note RECOVER (jam) PRINT(MESSAGE) END ;
   WHEN stop : n < 0 DO BRAKE ;
   WHEN stop OFF ;
+  TIMER lap ON ;
+  n = TIMER(lap) ;
   PRINT(n)
 END.
 """
@@ -150,6 +152,7 @@ begin log = twice(1); TEXT = log ; return[1] = true; log "a"(text, LOG); add(log
 wait until return[1] within 2 else begin print(1); halt end;
 try pulse lamp for 200ms; raise jam with s recover(jam, timeout) operate valve to 2 end;
 when Log : priority 2 : (text > 1) and input(door) do begin brake; when log off; resume end; when text=3 do text=4;
+timer Cycle on; timer S to 2; text = timer(S)+timer(cycle);
 wait until input(door) and text > 1
 end."""
 
@@ -194,6 +197,9 @@ BEGIN
   END ;
   WHEN text = 3 DO
     text = 4 ;
+  TIMER Cycle ON ;
+  TIMER S TO 2 ;
+  text = TIMER(S) + TIMER(cycle) ;
   WAIT UNTIL INPUT(door) AND text > 1
 END.
 """
@@ -230,6 +236,9 @@ def shown_at(word: str, text: str = PROGRAM) -> str:
         ("BOOLEAN", "A condition"),
         ("WHEN", "comes true on a servo tick"),
         ("stop :", "the name of a WHEN"),
+        ("TIMER", "Starts, stops or sets a timer"),
+        ("lap ON", "TIMER(name) are its seconds"),
+        ("lap)", "a timer:"),
         ("BRAKE", "stops the MOVE that it interrupts"),
         ("OFF", "Disarms a WHEN"),
     ],
@@ -252,7 +261,7 @@ def offered(written: str) -> list[str]:
         ("n = ", {"n", "pitch", "twice", "SQRT", "TIME", "ANALOG"}),
         ("ok = ", {"ok", "TRUE", "NOT", "INPUT"}),
         ("note = ", {"note", "TEXT", "MESSAGE"}),
-        ("", {"LOG", "PULSE", "RAISE", "WAIT", "WHEN", "RESUME"}),
+        ("", {"LOG", "PULSE", "RAISE", "WAIT", "WHEN", "RESUME", "TIMER"}),
         ("WHEN ", {"ok", "NOT", "PRIORITY", "INPUT"}),
         ("WHEN ok ", {"DO", "AND"}),
         ("WHEN ok DO ", {"MOVE", "BRAKE"}),

@@ -10,6 +10,7 @@ from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
 from armwright.cell.signals import Input, Signals, Wiring
 from armwright.cell.simulator import Simulator
+from armwright.physics.world import PhysicsCell
 from armwright.program import Source, compile as translate, run as run_program
 from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
 from armwright.program.vm.interpreter import interpret
@@ -270,3 +271,60 @@ def test_live_switch_in_the_debugger() -> None:
     assert times == pytest.approx([0.3, 0.3, 0.3, 0.3, 1.3])
     with pytest.raises(DebuggerError, match="has no input GONE"):
         debugger.set_input("gone", 1.0)
+
+
+def test_timers() -> None:
+    """A timer runs while it is on, keeps its seconds while it is off, and is set; all processes read the same one."""
+    text = """TIMER a ON ; PAUSE 0.5 ; PRINT(TIMER(a)) ; TIMER a OFF ; PAUSE 1 ; PRINT(TIMER(a)) ;
+    TIMER a ON ; TIMER a ON ; PAUSE 0.25 ; PRINT(TIMER(a)) ; TIMER a TO 0 ; PAUSE 0.125 ; PRINT(TIMER(a)) ;
+    TIMER b TO -2 ; PAUSE 1 ; PRINT(TIMER(b), TIMER(a) > 1) ; TIMER b ON ;
+    COBEGIN BEGIN WAIT UNTIL TIMER(b) >= 0 ; PRINT(TIMER(b)) END ; BEGIN PAUSE 1 ; TIMER b TO 4 END
+    COEND ;"""
+
+    assert lines(text) == ["0.5", "0.5", "0.75", "0.125", "-2 true", "4.001"]
+
+
+def test_timer_of_a_watch(sample: Sample) -> None:
+    """A WHEN on a timer acts on the tick at which that has run so long, whenever it was started."""
+    for rng in sample.cases(20):
+        start, length = rng.uniform(0.01, 0.5, 2).round(3)
+        text = f"PAUSE {start} ; TIMER a ON ; WHEN TIMER(a) >= {length} - 1E-9 DO PRINT(TIME) ; PAUSE 2"
+        assert float(lines(text)[0]) == pytest.approx(start + length, abs=1e-9)
+
+
+def test_timers_gone_back() -> None:
+    """In a run that is gone back in, a timer is what it was."""
+    text = "BEGIN\n  TIMER a ON ;\n  PAUSE 0.3 ;\n  TIMER a TO 7 ;\n  PAUSE 1\nEND.\n"
+    debugger = Debugger(code_of(text, signals_cell()), signals_cell())
+    debugger.begin()
+    debugger.run_slice()
+    for _ in range(3):
+        step(debugger, "next")
+    shown = [debugger.evaluate("TIMER(a)").value]
+    step(debugger, "back")
+
+    assert [*shown, debugger.evaluate("TIMER(a)").value] == ["7", "0.3"]
+
+
+def test_inputs_in_physics() -> None:
+    """In a cell with physics inputs change by their timeline, their device, their event and their switch alike."""
+    text = """VAR n : SCALAR ; ready : EVENT ;
+    BEGIN
+      FOR n = 0 TO 2 DO BEGIN PRINT(INPUT(door), ANALOG(level)) ; PAUSE 0.25 END ;
+      OPERATE press ON ; n = TIME ; WAIT UNTIL INPUT(pressed) ; PRINT(TIME - n) ;
+      SIGNAL ready ; PRINT(INPUT(asked), INPUT(begun)) ; PAUSE 0.1 ; PRINT(INPUT(asked), INPUT(begun)) ;
+      WAIT UNTIL INPUT(switch) ; PRINT(TIME) ;
+      WHEN NOT INPUT(switch) DO BEGIN BRAKE ; PRINT(TIME) ; RESUME END ;
+      MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.05) WITH SPEED = 20 ;
+    END."""
+    cell = signals_cell(SWITCH=Input())
+    code, spoken = code_of(text, cell), []
+    for kind in (PhysicsCell, Simulator):
+        hardware = kind(cell)
+        hardware.set_input("SWITCH", 1.0, 1.4)
+        hardware.set_input("SWITCH", 0.0, 1.6)
+        spoken.append(printed(interpret(code, cell, hardware)))
+
+    assert spoken[0][:7] == ["true -1", "true -1", "false 2.5", "0.25", "true true", "false true", "1.4"]
+    assert float(spoken[0][7]) > 1.6
+    assert spoken[0] == spoken[1]

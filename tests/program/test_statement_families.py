@@ -25,7 +25,7 @@ NODES = {
 }
 OPERATIONS = {
     "frames": {"AFFIX", "AFFAT", "UNFIX"},
-    "devices": {"OPEN", "GRASP", "OPER", "OPSET", "PULSE", "READV", "READS", "ZEROF"},
+    "devices": {"OPEN", "GRASP", "OPER", "OPSET", "PULSE", "TIMSW", "TIMSET", "READV", "READS", "ZEROF"},
     "move": {op.value for op in Op if op.value.startswith("MV")},
     "output": {"PRINT", "LOG"},
 }

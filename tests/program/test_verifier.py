@@ -33,6 +33,8 @@ TEXTS = {
     "PRINT (DIST (f, g)) END ; BEGIN p (0.1, ARM_1) ; p (0.2, WORLD) END.",
     "guards": "VAR f : FRAME ; BEGIN f = ARM_1 * XYZ (0, 0, 0.02) ; AFFIX f TO WORLD ; "
     "MOVE ARM_1 TO f WITH SPEED = 20 ON (DIST (ARM_1, f) < 0.01) OR (FORCE (Z) > 5) DO HALT ; UNFIX f END.",
+    "watches": "VAR n : SCALAR ; BEGIN n = 0 ; WHEN w : PRIORITY 2 : n > 1 DO BEGIN BRAKE ; n = 0 ; RESUME END ; "
+    "WHEN w OFF ; MOVE ARM_1 TO ARM_1 * XYZ (0, 0, 0.02) END.",
 }
 LIMITS = Limits(steps=2000, depth=20, processes=20, time=5.0)
 
@@ -87,6 +89,9 @@ def test_what_the_compiler_makes(path: Path) -> None:
         ("calls", r"CALL   P \S+", "CALL   P WORLD", "CALL expects a number, but WORLD is a pose or a transformation"),
         ("guards", r"FORCE  (%\d+) Z", r"FORCE  \1 W", "FORCE expects the axis X, Y or Z, or MX, MY or MZ, got W"),
         ("guards", r"MVHLT", "QUIT", "QUIT cannot end an action"),
+        ("watches", r"RESUME", "MVHLT", "MVHLT cannot end the action of a WHEN"),
+        ("watches", r"DISARM @\d+", "DISARM @0000", "DISARM expects instructions WHEN"),
+        ("watches", r"WHSET  W OFF", "WHSET  W N", "WHSET expects ON or OFF, got N"),
         ("guards", r"MVEND", "JOIN", "expected FORKs and their JOIN without other instructions in between"),
         ("guards", r"DIST   (%\d+)", r"PAUSE  1.0", "the operands of PAUSE have wrong kinds or a wrong number"),
     ],

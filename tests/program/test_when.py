@@ -12,12 +12,14 @@ from armwright.cell.simulator import Simulator
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.world import PhysicsCell
+from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.vm.interpreter import interpret
-from armwright.program.vm.machine import Limits
+from armwright.program.vm.machine import Limits, RunError
 from armwright.program.vm.recording import Effect, Recording
 from program.running import cell_of, code_of, failure, printed, run
 from program.test_signals import signals_cell
+from program.watching import watching_statements
 from samples import Sample
 
 PERIOD = 1e-3
@@ -348,6 +350,34 @@ def test_nested_actions_brake_and_resume(sample: Sample) -> None:
     {MOVES["LINE"]} ; PRINT(DIST(ARM_1, g) < 0.001)"""
     for rng in sample.cases(20):
         assert lines(text, GO=at(0.3), AGAIN=at(float(rng.uniform(0.25, 1.2)))) == ["true", "true"]
+
+
+def anyhow(code: Code, cell: Cell) -> Recording:
+    """Return the recording of a run, which may fail."""
+    try:
+        return interpret(code, cell, Simulator(cell), limits=Limits(time=20.0))
+    except RunError as error:
+        failed = error.recording
+    assert failed is not None
+    return failed()
+
+
+def test_random_programs(sample: Sample) -> None:
+    """Whatever interrupts what, the joints keep their limits, no motion jumps, and the run comes again."""
+    for rng in sample.cases(20):
+        inputs = {name: at(*np.sort(rng.uniform(0, 4, 8)).tolist()) for name in "ABC"}
+        text, cell = watching_statements(rng), signals_cell(**inputs)
+        code = code_of(f"{FRAMES}{text}\nEND.", cell)
+        first, second = (anyhow(code, cell) for _ in range(2))
+        arm, q = cell.arms["ARM_1"].arm, first.streams[0].q
+        for stage in first.stages:
+            assert (stage.motion.peaks(1) <= arm.limits.speed * LIMIT).all(), text
+            assert (stage.motion.peaks(2) <= arm.limits.acceleration * LIMIT).all(), text
+        # Between two stages, and between a stage and its stop, there is no jump either.
+        assert (np.abs(np.diff(q, axis=0)) <= arm.limits.speed * PERIOD * LIMIT).all(), text
+        assert (np.abs(np.diff(q, 2, axis=0)) <= arm.limits.acceleration * PERIOD**2 * 1.2).all(), text
+        assert q.tobytes() == second.streams[0].q.tobytes()
+        assert [effect.text for effect in first.effects] == [effect.text for effect in second.effects]
 
 
 # ---- waits that cannot end -----------------------------------------------------------------------------------------

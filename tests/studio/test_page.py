@@ -63,8 +63,9 @@ class Opened:
 
 
 @pytest.fixture
-def opened(browser: Any, tmp_path: Path) -> Iterator[Opened]:
-    (tmp_path / "bench.toml").write_text(CELL)
+def opened(browser: Any, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Opened]:
+    """Open the page of a cell, with what a test asks for behind it."""
+    (tmp_path / "bench.toml").write_text(CELL + getattr(request, "param", ""))
     (tmp_path / "bench.rlo").write_text(PROGRAM)
     command = [sys.executable, "-m", "armwright", "studio", "bench.toml", "bench.rlo"]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
@@ -400,3 +401,21 @@ def test_the_page_is_small(tmp_path: Path) -> None:
     (tmp_path / "bench.toml").write_text(CELL + second.replace("hand = ", base + "hand = ").replace("0.45,", "2.45,"))
     page = studio_page(Workbench(read_cell(tmp_path / "bench.toml")), token="t", policy="p")
     assert len(page.encode()) < 150_000
+
+
+@pytest.mark.parametrize("opened", ["[inputs]\nDOOR = {}\nLEVEL = { analogue = true, start = 2 }\n"], indirect=True)
+def test_inputs_are_set_on_the_page(opened: Opened) -> None:
+    """A digital input has a switch, an analogue one a number; both have names, and the keyboard sets them."""
+    page = opened.page
+    page.get_by_role("tab", name="Cell").click()
+    switch, number = page.get_by_role("switch", name="DOOR"), page.get_by_label("LEVEL")
+    assert (switch.get_attribute("aria-checked"), number.input_value()) == ("false", "2")
+    switch.focus()
+    page.keyboard.press("Space")
+    opened.until(lambda: opened.state()["inputs"]["DOOR"]["value"] == 1.0)
+    assert switch.get_attribute("aria-checked") == "true"
+    page.keyboard.press("Tab")
+    page.keyboard.type("7.5")
+    page.keyboard.press("Enter")
+    opened.until(lambda: opened.state()["inputs"]["LEVEL"]["value"] == 7.5)
+    assert page.locator("#inputs-card").get_attribute("aria-label") == "Inputs"

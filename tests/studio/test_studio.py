@@ -698,3 +698,36 @@ def test_what_cannot_be_made(pages: Pages) -> None:
     assert [job() for _, job in pages.studio.take_jobs()] == [None] * 8
     assert "ZeroDivisionError" in pages.state()["refusal"]
     assert pages.send("keep", what="page") == ""
+
+
+INPUTS = "[inputs.door]\nstart = 1\ntimeline = [[2.0, 1]]\n[inputs.level]\nanalogue = true\nstart = 3.5\n[frames]"
+WATCHED = "BEGIN\nWAIT UNTIL NOT INPUT(door) ;\nPRINT(TIME) ;\nWAIT UNTIL ANALOG(level) > 7 ;\nPAUSE 5\nEND.\n"
+
+
+def test_inputs(tmp_path: Path) -> None:
+    """Inputs are shown as a program reads them; what is set by hand counts from the time shown on.
+
+    The program runs ahead of what is shown, and is taken back to where the switch was set.
+    """
+    pages = Pages(tmp_path, cell=CELL.replace("[frames]", INPUTS), program=WATCHED)
+    values = lambda: {name: entry["value"] for name, entry in pages.state()["inputs"].items()}  # noqa: E731
+    assert values() == {"DOOR": 1.0, "LEVEL": 3.5}
+    assert pages.send("input", input="LEVEL", value=4) == ""
+    assert "expected 0 or 1, got 2" in pages.send("input", input="DOOR", value=2)
+    assert "did you mean" in pages.send("input", input="DOR", value=1).lower()
+    pages.send("run")
+    pages.wait(0.5)
+    assert values() == {"DOOR": 1.0, "LEVEL": 4.0}
+    assert pages.send("input", input="DOOR", value=0) == ""
+    shown = pages.state()["run"]["time"]
+    pages.wait(0.5)
+    assert values()["DOOR"] == 0.0
+    assert pages.studio.project.run is not None
+    begun = [effect for effect in pages.studio.project.run.happened.begun if effect.kind == "PRINT"]
+    assert [float(effect.data["printed"]) for effect in begun] == [pytest.approx(shown, abs=0.05)]
+    pages.send("pause")
+    assert pages.send("input", input="LEVEL", value=8) == ""
+    pages.send("go", step="continue")
+    pages.wait(2.0)
+    assert values() == {"DOOR": 1.0, "LEVEL": 8.0}
+    assert pages.state()["run"]["lines"][0]["line"] == 5

@@ -183,8 +183,11 @@ class SimulatedHardware(Hardware, Protocol):
     def copy(self) -> Self:
         """Return devices in the same state; later commands to one do not change the other."""
 
-    def set_input(self, name: str, value: float) -> None:
-        """Set an input by hand, as a switch in front of the cell does.
+    def input_at(self, name: str, time: float) -> float:
+        """Return what an input of the cell is at a time that has been come to [s]."""
+
+    def set_input(self, name: str, value: float, time: float | None = None) -> None:
+        """Set an input by hand, as a switch in front of the cell does, from a time on [s], or from now on.
 
         Raises:
             DeviceError: there is no such input, or a digital one would be neither 0 nor 1.

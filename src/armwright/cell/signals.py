@@ -106,14 +106,15 @@ class Signals:
         """Take note that the program has signalled an event now."""
         self._events[event] = (*self._events.get(event, ()), (self.now, 1.0))
 
-    def set_input(self, name: str, value: float) -> None:
-        """Set an input by hand: from now on it is that, until its timeline, output or event changes it."""
-        before = tuple(change for change in self._switches.get(name, ()) if change[0] < self.now - _SAME_TIME)
-        self._switches[name] = (*before, (self.now, value))
+    def set_input(self, name: str, value: float, time: float | None = None) -> None:
+        """Set an input by hand: from a time on, or now, it is that, until its timeline, output or event changes it."""
+        when = self.now if time is None else time
+        before = tuple(change for change in self._switches.get(name, ()) if change[0] < when - _SAME_TIME)
+        self._switches[name] = (*before, (when, value))
 
-    def input(self, name: str) -> float:
-        """Return what an input is now: what came last of its timeline, its output, its event and its switch."""
-        source, now = self._inputs[name], self.now
+    def input(self, name: str, time: float | None = None) -> float:
+        """Return what an input is now, or at a time: what came last of its timeline, output, event and switch."""
+        source, now = self._inputs[name], self.now if time is None else time
         changes = [latest_change(source.timeline, now)]
         if source.follows is not None and (
             repeated := latest_change(self._outputs.get(source.follows, ()), now - source.delay)

@@ -357,8 +357,12 @@ class Simulator:
             raise DeviceError(f"input {name} of cell '{self._cell.name}' is {kind}; read it by {function}")
         return self._signals.input(name)
 
-    def set_input(self, name: str, value: float) -> None:
-        """Set an input by hand, from now on.
+    def input_at(self, name: str, time: float) -> float:
+        """Return what an input of the cell is at a time that has been come to [s]."""
+        return self._signals.input(name, time)
+
+    def set_input(self, name: str, value: float, time: float | None = None) -> None:
+        """Set an input by hand, from a time on [s], or from now on.
 
         Raises:
             DeviceError: there is no such input, a digital one would be neither 0 nor 1, or the number is not finite.
@@ -368,7 +372,7 @@ class Simulator:
             raise DeviceError(f"input {name} of cell '{self._cell.name}': expected a finite number, got {value:g}")
         if not self._cell.wiring.inputs[name].analogue and value not in (0.0, 1.0):
             raise DeviceError(f"input {name} of cell '{self._cell.name}' is digital: expected 0 or 1, got {value:g}")
-        self._signals.set_input(name, value)
+        self._signals.set_input(name, value, time)
 
     def _require_input(self, name: str) -> None:
         inputs = self._cell.wiring.inputs

@@ -38,7 +38,7 @@ _LOOKS = 65
 _PART_OF_LEG = 0.4
 SWITCHING = ("OPEN", "GRASP", "OPERATE")
 # What takes no part in an export: it changes frames, or orders the branches of a program.
-_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT")
+_SILENT = ("PLACE", "AFFIX", "UNFIX", "LOCK", "SIGNAL", "WAIT", "TIMER")
 # What reads the cell while the program runs.
 _READING = (Op.INPUT, Op.ANALOG, Op.FORCE)
 

@@ -58,6 +58,19 @@ class Stop:
     reached: float
 
 
+@attrs.frozen
+class Resumption:
+    """A motion that goes on along its path from rest.
+
+    Attributes:
+        trajectory: from rest to the end of the motion.
+        clock: the time of the motion [s] at each time of the trajectory, as a motion of one number.
+    """
+
+    trajectory: Trajectory
+    clock: Trajectory
+
+
 def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Trajectory:
     """Return the motion that stops an arm along its path.
 
@@ -91,10 +104,11 @@ def stop_on_path(running: Trajectory, t: float, acceleration: ArrayLike, *, peri
     return Stop(_until_a_tick(_run_by(running, _to_its_end(running, t)), period), running.duration)
 
 
-def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Trajectory:
+def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Resumption:
     """Return the motion from rest at a position of a path along the rest of it.
 
-    Its speeds and accelerations begin at 0 and do not jump; once the start is over it runs as the motion did.
+    Its speeds and accelerations begin at 0 and do not jump; once the start is over it runs as the motion did. To resume
+    what was resumed and stopped again, the clock tells where on the path of the first motion that was.
 
     Args:
         running: the motion whose path is followed, within its limits, to rest at its end.
@@ -107,15 +121,18 @@ def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: fl
     """
     limit, own = _limits(running, t, acceleration)
     if t == running.duration:
-        return hold(running(t), period or _STEP)
+        return Resumption(*(hold(at_end, period or _STEP) for at_end in (running(t), np.array([t]))))
     allowed = np.maximum(limit, own) * (1 + _ROUNDING)
     length = max(2 * float((np.abs(running(t, 1)) / limit).max()), period or _STEP, 2 * _RAMP)
     for _ in range(_TRIES):
-        start = _run_by(running, _from_rest(running, t, length))
+        cells = _from_rest(running, t, length)
+        start = _run_by(running, cells)
         if (start.peaks(2) <= allowed).all():
             break
         length *= _LONGER
-    return _until_a_tick(start, period)
+    terms = np.array([[cell.tau, cell.rate, cell.slowing / 2, cell.fading / 6] for cell in cells])
+    clock = Trajectory(times=start.times, coefficients=terms[:, :, None])
+    return Resumption(_until_a_tick(start, period), _until_a_tick(clock, period))
 
 
 def _limits(running: Trajectory, t: float, acceleration: ArrayLike) -> tuple[Array, Array]:

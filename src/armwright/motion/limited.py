@@ -14,7 +14,7 @@ from armwright.arm.coupling import Coupling
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array
 from armwright.kinematics.inverse_kinematics.solution import Violation, violations_of_all
-from armwright.motion.controlled_stop import Stop, resume, stop_on_path
+from armwright.motion.controlled_stop import Resumption, Stop, resume, stop_on_path
 from armwright.motion.trajectory import Trajectory
 
 
@@ -43,9 +43,10 @@ def braked(arm: Arm, running: Trajectory, t: float, *, period: float) -> Stop:
     return attrs.evolve(stop, trajectory=_of_joints(arm, stop.trajectory))
 
 
-def resumed(arm: Arm, running: Trajectory, t: float, *, period: float) -> Trajectory:
+def resumed(arm: Arm, running: Trajectory, t: float, *, period: float) -> Resumption:
     """Return the rest of a motion of an arm that stands on its path, within its limits: see ``resume``."""
-    return _of_joints(arm, resume(limited_motion(arm, running), t, _accelerations(arm), period=period))
+    rest = resume(limited_motion(arm, running), t, _accelerations(arm), period=period)
+    return attrs.evolve(rest, trajectory=_of_joints(arm, rest.trajectory))
 
 
 def _accelerations(arm: Arm) -> Array:

@@ -283,9 +283,13 @@ class PhysicsCell:
         """Return an input as it is now."""
         return self._believed.read_input(name, analogue=analogue)
 
-    def set_input(self, name: str, value: float) -> None:
-        """Set an input by hand, from now on."""
-        self._believed.set_input(name, value)
+    def input_at(self, name: str, time: float) -> float:
+        """Return what an input of the cell is at a time that has been come to [s]."""
+        return self._believed.input_at(name, time)
+
+    def set_input(self, name: str, value: float, time: float | None = None) -> None:
+        """Set an input by hand, from a time on [s], or from now on."""
+        self._believed.set_input(name, value, time)
 
     def note_event(self, event: str) -> None:
         """Take note that the program signals an event now."""

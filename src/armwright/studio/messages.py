@@ -336,6 +336,14 @@ class Operate:
 
 
 @attrs.frozen(kw_only=True)
+class SetInput:
+    """Set an input of the cell by hand."""
+
+    input: str
+    value: float
+
+
+@attrs.frozen(kw_only=True)
 class Look:
     """Send what a camera sees."""
 
@@ -401,6 +409,7 @@ Command: TypeAlias = (
     | Preview
     | Keep
     | Operate
+    | SetInput
     | Look
     | KeepMotion
     | Complete
@@ -441,6 +450,7 @@ _COMMANDS: dict[str, type[Any]] = {
     "preview": Preview,
     "keep": Keep,
     "operate": Operate,
+    "input": SetInput,
     "look": Look,
     "keep motion": KeepMotion,
     "complete": Complete,

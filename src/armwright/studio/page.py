@@ -24,6 +24,8 @@ from armwright.version import __version__
 # A comment of a style; in scripts they are lines, or stand behind a statement.
 _BLOCK_COMMENT = re.compile(r"^[ ]*/\*.*?\*/$", re.DOTALL | re.MULTILINE)
 _LINE_COMMENT = re.compile(r"(^|;) *// .*$", re.MULTILINE)
+# Blanks that mean nothing in a style: around what ends a rule or a declaration, and behind a colon or a comma.
+_STYLE_BLANKS = re.compile(r"\s*([{};])\s*|([:,])\s+")
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = (
     "basics.js",
@@ -61,7 +63,8 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         policy: what the page may do, as of Content-Security-Policy.
     """
     script = _without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)]))
-    style = _without_comments("\n".join([*map(asset, ("page.css", "film.css", "view.css")), _asset("studio.css")]))
+    styles = "\n".join([*map(asset, ("page.css", "film.css", "view.css")), _asset("studio.css")])
+    style = _STYLE_BLANKS.sub(r"\1\2", _without_comments(styles))
     return Template(_without_comments(_asset("studio.html"))).substitute(
         head=page_head(f"{workbench.cell.name} - armwright studio", policy, style),
         name=html.escape(workbench.cell.name),

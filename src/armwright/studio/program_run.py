@@ -13,7 +13,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
-from armwright.cell.hardware import HardwareFactory
+from armwright.cell.hardware import HardwareFactory, SimulatedHardware
 from armwright.cell.model import Cell
 from armwright.cell.observations import Picture
 from armwright.errors import UnknownNameError
@@ -124,6 +124,19 @@ class ProgramRun:
             if ahead:
                 self._rewind()
             self._take_lines(kept)
+            if ahead:
+                self._debugger.resume("continue")
+
+        self._do(change)
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input of the cell by hand, from what is shown on; it has been checked."""
+
+        def change() -> None:
+            ahead = self._is_ahead()
+            if ahead:
+                self._rewind()
+            self._debugger.set_input(name, value)
             if ahead:
                 self._debugger.resume("continue")
 
@@ -323,6 +336,12 @@ class ProgramRun:
         if isinstance(hardware, PhysicsCell):
             return {name: (None, hardware.part_pose(name, time)) for name in self._cell.parts}
         return {name: track.at(time) for name, track in hardware.part_poses().tracks.items()}
+
+    def inputs(self) -> dict[str, float]:
+        """Return what the inputs of the cell are at the time that is shown."""
+        hardware = self._computed.machine.hardware
+        assert isinstance(hardware, SimulatedHardware)  # noqa: S101 - the debugger runs no others
+        return {name: hardware.input_at(name, self.time) for name in self._cell.wiring.inputs}
 
     def pictures(self) -> tuple[Picture, ...]:
         """Return the pictures that cameras have taken up to the time that is shown."""

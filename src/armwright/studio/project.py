@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from armwright.cell.frames import WORLD
-from armwright.cell.hardware import HardwareFactory
+from armwright.cell.hardware import HardwareFactory, SimulatedHardware
 from armwright.cell.model import Cell
-from armwright.errors import ArmwrightError, UnknownNameError, shown
+from armwright.errors import ArmwrightError, InvalidValueError, UnknownNameError, shown
 from armwright.files.inputs import read_program
 from armwright.physics.camera_view import CameraView
 from armwright.physics.kinematic_cell import kinematic_cell
@@ -39,6 +39,7 @@ class Project:
         run_number: counts the runs.
         breakpoints: lines of the program.
         devices: that are on, while no program runs.
+        inputs: that were set by hand while no program ran, with which the next run begins.
         compared: motions of earlier runs that are shown beside one another, at most two.
         executor: computes runs beside whoever shows them; None for not beside.
     """
@@ -60,6 +61,7 @@ class Project:
         self.run: ProgramRun | None = None
         self.breakpoints: set[int] = set()
         self.devices: set[str] = set()
+        self.inputs: dict[str, float] = {}
         self.compared: list[KeptMotion] = []
         self.run_number = self._kept = 0
         self.executor: Executor | None = None
@@ -233,7 +235,14 @@ class Project:
             error = first_error(compiled)
             where = compiled.source.line(error.span.start)
             raise ProgramTextError(f"line {where}: {error.code}: {error.message}")
-        hardware: HardwareFactory = PhysicsCell if physics else kinematic_cell
+        kind: HardwareFactory = PhysicsCell if physics else kinematic_cell
+
+        def hardware(cell: Cell) -> SimulatedHardware:
+            made = kind(cell)
+            for name, value in self.inputs.items():
+                made.set_input(name, value)
+            return made
+
         self.run_number += 1
         self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints, self.executor)
         self.run.begin(stop_on_entry=entry)
@@ -263,6 +272,30 @@ class Project:
         if device not in known:
             raise UnknownNameError("device", device, known)
         (self.devices.add if on else self.devices.discard)(device)
+
+    def set_input(self, name: str, value: float) -> None:
+        """Set an input of the cell by hand, in the run from what is shown on, or for the next run.
+
+        Raises:
+            UnknownNameError: there is none of this name.
+            InvalidValueError: a digital one would be neither 0 nor 1.
+        """
+        inputs = self.workbench.cell.wiring.inputs
+        if name not in inputs:
+            raise UnknownNameError("input", name, inputs)
+        if not inputs[name].analogue and value not in (0.0, 1.0):
+            raise InvalidValueError(f"input {name} is digital: expected 0 or 1, got {value:g}")
+        if self.run is None:
+            self.inputs[name] = value
+        else:
+            self.run.set_input(name, value)
+
+    def _input_states(self) -> dict[str, dict[str, Any]]:
+        inputs = self.workbench.cell.wiring.inputs
+        values = {name: source.start for name, source in inputs.items()} | self.inputs
+        if self.run is not None:
+            values = self.run.inputs()
+        return {name: {"value": values[name], "analogue": source.analogue} for name, source in inputs.items()}
 
     def _known_devices(self) -> list[str]:
         """Return the devices of the cell, and those that a run has switched."""
@@ -317,7 +350,8 @@ class Project:
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of it beside its files, as plain data."""
-        return {"run": None if self.run is None else self.run.state(), "devices": self._device_states()}
+        run = None if self.run is None else self.run.state()
+        return {"run": run, "devices": self._device_states(), "inputs": self._input_states()}
 
 
 def _new_path(name: str, suffix: str) -> Path:

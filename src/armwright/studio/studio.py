@@ -144,6 +144,8 @@ class Studio:
                 self._jog = None
             case m.Operate():
                 self.project.operate(command.device, on=command.on)
+            case m.SetInput():
+                self.project.set_input(command.input, command.value)
             case m.Grip():
                 bench.grip(command.arm, open_it=command.open, now=now)
             case m.Undo():

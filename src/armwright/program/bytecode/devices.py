@@ -23,6 +23,14 @@ def operate(context: Context, node: tree.Operate) -> None:
     context.out.emit(Op.OPER, context.out.value(node.device), "ON" if node.on else "OFF", span=node.span)
 
 
+def set_timer(context: Context, node: tree.SetTimer) -> None:
+    """Generate one TIMER."""
+    if node.value is not None:
+        context.out.emit(Op.TIMSET, node.name.key, context.out.value(node.value), span=node.span)
+    else:
+        context.out.emit(Op.TIMSW, node.name.key, "ON" if node.on else "OFF", span=node.span)
+
+
 def read_visions(context: Context, node: tree.ReadVisions) -> None:
     """Generate one instruction for each frame that the camera is to find."""
     for target in node.targets:
@@ -34,6 +42,7 @@ GENERATORS: Generators = {
     tree.Grasp: grasp,
     tree.Operate: operate,
     tree.Pulse: one_instruction(Op.PULSE),
+    tree.SetTimer: set_timer,
     tree.ReadVisions: read_visions,
     tree.ReadSystem: one_instruction(Op.READS),
     tree.ZeroForce: one_instruction(Op.ZEROF),

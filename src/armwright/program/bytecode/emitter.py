@@ -8,7 +8,7 @@ from armwright.program.bytecode.instructions import Constant, Instruction, JumpT
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import convert
 from armwright.program.language.words import VALUES
-from armwright.program.semantics.builtins import WITH_DEVICE
+from armwright.program.semantics.builtins import WITH_KEY
 from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import pose_literals, tree
 
@@ -110,7 +110,7 @@ class Emitter:
     def _function(self, node: tree.Function, into: str | None) -> str:
         is_own = node.name.key in self.scope.symbols.procedures
         operands: list[Operand]
-        if node.name.key in WITH_DEVICE and not is_own:
+        if node.name.key in WITH_KEY and not is_own:
             operands = [name.key for name in node.arguments if isinstance(name, tree.Name)]
         else:
             operands = [self.value(argument) for argument in node.arguments]

@@ -91,6 +91,7 @@ class Op(enum.StrEnum):
     ANALOG = "ANALOG", "N=w"  # to, input: its number
     OUTPUT = "OUTPUT", "T=w"  # to, device: whether it is on
     SETTING = "SETTING", "N=w"  # to, device: what it is set to
+    TIMER = "TIMER", "N=w"  # to, timer: its seconds
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
     AFFIX = "AFFIX", "FF(r)"  # child, parent[, RIGIDLY]: hang on, where both stand now
@@ -102,6 +103,8 @@ class Op(enum.StrEnum):
     OPER = "OPER", "wo"  # device, ON or OFF
     OPSET = "OPSET", "wN"  # device, number
     PULSE = "PULSE", "wN"  # device, seconds
+    TIMSW = "TIMSW", "wo"  # timer, ON or OFF
+    TIMSET = "TIMSET", "wN"  # timer, seconds
     READV = "READV", "F"  # frame: ask the vision system
     READS = "READS", "w"  # arm: read the joint sensors
     ZEROF = "ZEROF", "w"  # arm: its present force and moment count as zero

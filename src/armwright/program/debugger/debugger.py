@@ -364,10 +364,12 @@ class Debugger:
             DebuggerError: the run does not stand still, the cell has no such input, or it cannot be set so.
         """
         self._require_stopped()
+        # The program may have done its latest step before the time that is shown.
+        now = self.time
 
         def change(machine: Machine) -> None:
             assert isinstance(machine.hardware, SimulatedHardware)  # noqa: S101 - the debugger runs no others
-            machine.hardware.set_input(name.upper(), value)
+            machine.hardware.set_input(name.upper(), value, now)
 
         try:
             self.execution.timeline.apply_change(change)

@@ -120,6 +120,7 @@ STEPS: Steps = {
     tree.Grasp: of_state(grasp),
     tree.Operate: of_state(operate),
     tree.Pulse: of_state(operate),
+    tree.SetTimer: of_state(lambda state, node: require_value(state, node.value)),
     tree.ReadVisions: of_state(read_visions),
     tree.ReadSystem: of_state(read_system),
     tree.ZeroForce: of_state(zero_force),

@@ -8,7 +8,7 @@ import attrs
 
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_DEVICE
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, WITH_AXIS, WITH_KEY
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, Token, TokenKind
 
@@ -155,9 +155,9 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
             if in_units or is_axis or statement_phrase(before, key, follows) or (before == "READ" and key in SENSORS):
                 yield key
             elif (
-                before in ("OPERATE", "PULSE")
+                before in ("OPERATE", "PULSE", "TIMER")
                 or (before == "WHEN" and follows in (":", "ON", "OFF"))
-                or (before == "(" and earlier in WITH_DEVICE and follows == ")")
+                or (before == "(" and earlier in WITH_KEY and follows == ")")
             ):
                 yield token.text
             else:

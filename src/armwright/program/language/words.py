@@ -71,7 +71,7 @@ PARAMETER_MODES = ("IN", "INOUT")
 PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
 WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION")
 # What starts a statement only in front of a name.
-STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE")
+STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE", "TIMER")
 # What starts a statement only in front of a text.
 STATEMENTS_BEFORE_TEXT = ("LOG",)
 # What is a statement by itself, where neither `=` nor a bracket follows.
@@ -112,6 +112,7 @@ UNSUPPORTED_STATEMENTS = {
         "IF, WHILE and FOR contain one statement and have no end keyword; write `BEGIN ... END` around several",
     ),
     "RAISE": "write `RAISE kind`, with a name for errors of this kind",
+    "TIMER": "write `TIMER name ON`",
     "PULSE": "write `PULSE device FOR seconds`",
     "LOG": 'write `LOG "name" (values)`',
     "CALL": "a procedure is called by its name: `name(...)`",

@@ -76,6 +76,7 @@ _WORD_SNIPPETS = {
     "FORCE": "FORCE ${1:ARM_1}",
     "RAISE": "RAISE ${1:kind} WITH ${2:text}",
     "PULSE": "PULSE ${1:device} FOR ${2:0.5s}",
+    "TIMER": "TIMER ${1:name} ${2|ON,OFF,TO 0|}",
     "LOG": 'LOG "${1:name}" (${2:value})',
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
@@ -172,6 +173,7 @@ _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     "TEXT": _ANY_VALUE,
     **dict.fromkeys(WITH_INPUT, _OperandRule(inputs=True)),
     **dict.fromkeys(("OUTPUT", "SETTING"), _OperandRule(devices=True)),
+    "TIMER": _OperandRule(),
     "DIST": _POSE,
     **dict.fromkeys(("INV", *MEASURES), _STEP),
     **{

@@ -23,7 +23,7 @@ from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.vm.value_text import value_text
 
 # Words that a statement can start with and that a word of the same statement is looked up by.
-_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE", "WHEN"))
+_STATEMENT_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE", "WHEN", "TIMER"))
 
 
 # What something is, as the language would write it; and what there is to say about it, a sentence or fact each.
@@ -92,6 +92,13 @@ def _statement_word(analysis: Analysis, token: Token) -> str:
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
+# Names that are not declared and are of no cell.
+_UNDECLARED = {
+    NameKind.WATCH: "the name of a WHEN, by which it is armed and disarmed",
+    NameKind.TIMER: "a timer: TIMER starts, stops and sets it, and TIMER(name) are its seconds",
+}
+
+
 def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
     key, text = occurrence.key, analysis.text[occurrence.start : occurrence.end]
     procedure = analysis.compiled.symbols.procedures.get(key)
@@ -110,7 +117,9 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = text, [_describe_target(analysis, key)]
         case NameKind.UNIT if key in UNITS:
             description = key, [f"a unit of {dimension(key)}"]
-        case NameKind.ERROR | NameKind.WATCH | NameKind.AXIS:
+        case NameKind.WATCH | NameKind.TIMER:
+            description = text, [_UNDECLARED[occurrence.kind]]
+        case NameKind.ERROR | NameKind.AXIS:
             description = text, [_describe_plain(occurrence.kind, key)]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
@@ -120,8 +129,6 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
 
 def _describe_plain(kind: NameKind, key: str) -> str:
     """Return what a name is that stands for nothing in the cell or the program."""
-    if kind is NameKind.WATCH:
-        return "the name of a WHEN, by which it is armed and disarmed"
     if kind is NameKind.AXIS:
         return f"the {key.lower()} axis"
     own = "a kind of error of the program, which RAISE raises and RECOVER may name"

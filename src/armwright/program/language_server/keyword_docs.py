@@ -78,6 +78,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "OPERATE device [ON | OFF] | OPERATE device TO number",
         "Switches a device on or off, or sets an analogue one; all are off when the program ends.",
     ),
+    "TIMER": (
+        "TIMER name ON | OFF | TO seconds",
+        "Starts, stops or sets a timer; as a function, TIMER(name) are its seconds.",
+    ),
     "PULSE": ("PULSE device FOR seconds", "Switches a device on for this time, while the program goes on."),
     "OFF": ("OPERATE device OFF", "Switches a device off."),
     "READ": (
@@ -237,6 +241,12 @@ _STATEMENT_WORDS: Mapping[tuple[str, str], tuple[str, str]] = {
     ("FOR", "TO"): (_FOR, "Precedes the last value; both bounds are evaluated once, before the loop."),
     ("MOVE", "TO"): (_MOVE, "Precedes the goal."),
     ("OPERATE", "ON"): ("OPERATE device ON", "Switches a device on; this is the default."),
+    ("TIMER", "ON"): ("TIMER name ON", "Lets a timer run, on from where it stands."),
+    ("TIMER", "OFF"): ("TIMER name OFF", "Stops a timer, which keeps its seconds."),
+    ("TIMER", "TO"): (
+        "TIMER name TO seconds",
+        "Sets a timer, which runs on from there, or stands there.",
+    ),
     ("WHEN", "ON"): ("WHEN name ON", "Arms a WHEN again that was disarmed."),
     ("WHEN", "OFF"): ("WHEN name OFF", "Disarms a WHEN until it is armed again."),
     ("WHEN", "PRIORITY"): (

@@ -22,6 +22,7 @@ _NOT_RENAMEABLE = {
     NameKind.AXIS: "an axis",
     NameKind.ERROR: "a kind of error",
     NameKind.WATCH: "the name of a WHEN",
+    NameKind.TIMER: "a timer",
 }
 
 
@@ -137,5 +138,5 @@ def _require_unused_globally(analysis: Analysis, occurrence: Occurrence, new: st
 def _referring_occurrences(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences whose meaning depends on their name, not on their position in a statement."""
     fixed = {NameKind.UNIT, NameKind.SENSOR, NameKind.AXIS, NameKind.DEVICE, NameKind.TARGET}
-    fixed |= {NameKind.VALUE, NameKind.ERROR, NameKind.WATCH}
+    fixed |= {NameKind.VALUE, NameKind.ERROR, NameKind.WATCH, NameKind.TIMER}
     return tuple(occurrence for occurrence in analysis.occurrences if occurrence.kind not in fixed)

@@ -46,6 +46,7 @@ _NAME_STYLES = {
     NameKind.SENSOR: ("keyword", 0),
     NameKind.ERROR: ("enumMember", 0),
     NameKind.WATCH: ("enumMember", 0),
+    NameKind.TIMER: ("variable", 0),
     NameKind.AXIS: ("enumMember", _BIT["readonly"]),
     NameKind.VALUE: ("variable", _BIT["readonly"] | _BIT["defaultLibrary"] | _BIT["scalar"]),
 }

@@ -21,6 +21,7 @@ _PARAMETERS = {
     "JOINTS": ("q1", "q2", "q3"),
     **dict.fromkeys(WITH_INPUT, ("input",)),
     **dict.fromkeys(("OUTPUT", "SETTING"), ("device",)),
+    "TIMER": ("timer",),
     "RPY": ("roll", "pitch", "yaw"),
     "ROT": ("x", "y", "z", "angle"),
     **dict.fromkeys(MEASURES, ("pose",)),

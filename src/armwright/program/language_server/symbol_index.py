@@ -9,7 +9,7 @@ import attrs
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS, statement_phrase
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, WITH_AXIS, WITH_DEVICE
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, WITH_AXIS, WITH_KEY
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax.lexer import Token, TokenKind
 
@@ -35,6 +35,7 @@ class NameKind(enum.Enum):
     ERROR = "kind of error"
     WATCH = "name of a WHEN"
     TARGET = "joint target"
+    TIMER = "timer"
     UNKNOWN = "unknown name"
 
 
@@ -107,6 +108,14 @@ def scope_extents(symbols: Symbols, brought: Mapping[str, str]) -> ScopeExtents:
     return ScopeExtents(starts, scopes, brought)
 
 
+# What a name behind these words is.
+_NAMED = {
+    **dict.fromkeys(("OPERATE", "PULSE"), NameKind.DEVICE),
+    "TIMER": NameKind.TIMER,
+    "WHEN": NameKind.WATCH,
+}
+
+
 def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurrence, ...]:
     """Return the names among some tokens.
 
@@ -148,8 +157,8 @@ def _classify_argument(name: Occurrence, function: str, next_key: str) -> None:
     """Change what the first argument of a function is, where that takes the name of something else than a variable."""
     if name.key in AXES and function in WITH_AXIS:
         name.kind, name.owner, name.type = NameKind.AXIS, None, None
-    elif function in WITH_DEVICE and next_key == ")":
-        name.kind, name.owner, name.type = NameKind.DEVICE, None, None
+    elif function in WITH_KEY and next_key == ")":
+        name.kind, name.owner, name.type = NameKind.TIMER if function == "TIMER" else NameKind.DEVICE, None, None
     elif function == JOINTS and next_key == ")" and name.kind is NameKind.UNKNOWN:
         name.kind = NameKind.TARGET
 
@@ -168,9 +177,8 @@ def _classify_name(token: Token, key: str, scope: Scope, previous: str, next_key
     phrase = statement_phrase(previous, key, next_key)
     if phrase or (previous == "READ" and key in SENSORS):
         return Occurrence(start, end, phrase or key, NameKind.SENSOR)
-    is_watch = previous == "WHEN" and next_key in (":", "ON", "OFF")
-    if is_watch or previous in ("OPERATE", "PULSE"):
-        return Occurrence(start, end, key, NameKind.WATCH if is_watch else NameKind.DEVICE)
+    if previous in _NAMED and (previous != "WHEN" or next_key in (":", "ON", "OFF")):
+        return Occurrence(start, end, key, _NAMED[previous])
     if next_key == "(" and key in FUNCTIONS:
         return Occurrence(start, end, key, NameKind.FUNCTION)
     return _classify_variable(token, key, scope)

@@ -18,8 +18,10 @@ WITH_AXIS = ("FORCE", "TORQUE")
 # Functions whose argument is an input or a device of the cell.
 WITH_INPUT = ("INPUT", "ANALOG")
 WITH_DEVICE = (*WITH_INPUT, "OUTPUT", "SETTING")
+# Functions whose argument is a name that is not declared.
+WITH_KEY = (*WITH_DEVICE, "TIMER")
 # Functions whose argument is a name that is no variable.
-WITH_NAME = (*WITH_AXIS, *WITH_DEVICE)
+WITH_NAME = (*WITH_AXIS, *WITH_KEY)
 # The goal of a MOVE by the positions of the joints, or by the name of a joint target of the cell.
 JOINTS = "JOINTS"
 # Procedures of programs may not have the names of these: all other functions came later than such programs.
@@ -65,6 +67,7 @@ FUNCTIONS: Mapping[str, Signature] = {
     **dict.fromkeys(WITH_AXIS, Signature("one axis, X, Y or Z", 1, frozenset(), ExpressionType.SCALAR)),
     **dict.fromkeys(("INPUT", "OUTPUT"), Signature("one name of the cell", 1, frozenset(), ExpressionType.CONDITION)),
     **dict.fromkeys(("ANALOG", "SETTING"), Signature("one name of the cell", 1, frozenset(), _NUMBER)),
+    "TIMER": Signature("one name of a timer", 1, frozenset(), _NUMBER),
     "RPY": Signature("three angles", 3, _SCALARS, _TRANS, "angle"),
     "ROT": Signature("the three components of an axis and an angle", 4, _SCALARS, _TRANS, "angle"),
     **dict.fromkeys(MEASURES, Signature("one FRAME or TRANS", 1, _POSES, _NUMBER)),
@@ -98,7 +101,7 @@ def result_type(
         names.report("E220", f"{required}, not {count}", node.span, f"{count} here")
         return signature.result if key != "INV" else None
     if key in WITH_NAME:
-        (_check_axis if key in WITH_AXIS else _check_device)(names, key, node.arguments[0])
+        (_check_axis if key in WITH_AXIS else _check_key)(names, key, node.arguments[0])
         return signature.result
     for argument, argument_type in zip(node.arguments, argument_types, strict=True):
         if argument_type is ExpressionType.EVENT:
@@ -126,12 +129,15 @@ def joint_target(scope: Scope, node: tree.Function) -> tree.Name | None:
     return None if only.key in scope.table(only.key).types else only
 
 
-def _check_device(names: NameResolver, function: str, node: tree.Expression) -> None:
+def _check_key(names: NameResolver, function: str, node: tree.Expression) -> None:
+    if isinstance(node, tree.Name) and function == "TIMER":
+        names.timers_read.append(node)
     if isinstance(node, tree.Poison | tree.Name):
         return
     names.mark_used(variable_keys(node))
-    what = "input" if function in WITH_INPUT else "device"
-    text = f"{function} takes the name of an {what} of the cell, not {quote_expression(node)}".replace("an d", "a d")
+    what = "input" if function in WITH_INPUT else "timer" if function == "TIMER" else "device"
+    name = {"input": "an input of the cell", "device": "a device of the cell"}.get(what, "a timer")
+    text = f"{function} takes the name of {name}, not {quote_expression(node)}"
     names.report("E220", text, node.span, f"no {what}")
 
 

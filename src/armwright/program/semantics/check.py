@@ -57,5 +57,6 @@ def check(
     Context(CHECKS, names, calls).check(*program.statements)
     calls.report_fixed_arguments()
     control_flow.report_unknown_kinds(names)
+    devices.report_unknown_timers(names)
     names.report_unused(exported)
     return names.symbols, names.diagnostics, tuple(names.imports)

@@ -44,6 +44,26 @@ def pulse(context: Context, node: tree.Pulse) -> None:
         check_range(context.names, node.duration, "a pulse", zero=False)
 
 
+def set_timer(context: Context, node: tree.SetTimer) -> None:
+    """Check what a timer is set to; timers are not declared."""
+    names = context.names
+    if node.on or node.value is not None:
+        names.timers.add(node.name.key)
+    else:
+        names.timers_read.append(node.name)
+    if node.value is not None:
+        require_quantity(names, node.value, "time", "TIMER ... TO needs a time")
+
+
+def report_unknown_timers(names: NameResolver) -> None:
+    """Report timers that are read or stopped, and that nothing starts."""
+    for timer in names.timers_read:
+        if timer.key not in names.timers:
+            near = names.closest_name(timer.text, lambda: list(names.timers))
+            advice = did_you_mean(near) or f"write `TIMER {timer.text} ON` where it begins"
+            names.report("E244", f"nothing starts the timer `{timer.text}`", timer.span, "never runs", advice=advice)
+
+
 def _device(names: NameResolver, device: tree.Mobile, what: str) -> None:
     if isinstance(device, tree.ArmName):
         names.report("E201", f"{what}, but `{device.text}` is an arm", device.span, "an arm")
@@ -95,6 +115,7 @@ CHECKS: Checks = {
     tree.Grasp: lambda context, node: _arm(context.names, node.arm, "GRASP"),
     tree.Operate: operate,
     tree.Pulse: pulse,
+    tree.SetTimer: set_timer,
     tree.ReadVisions: read_visions,
     tree.ReadSystem: lambda context, node: _arm(context.names, node.arm, "READ SYSTEM"),
     tree.ZeroForce: lambda context, node: _arm(context.names, node.arm, "ZERO FORCE"),

@@ -32,6 +32,9 @@ class NameResolver:
         # The kinds of errors that the program raises, and those that its RECOVERs name.
         self.raised: set[str] = set()
         self.recovered: list[tree.Name] = []
+        # The timers that the program starts or sets, and where it reads one.
+        self.timers: set[str] = set()
+        self.timers_read: list[tree.Name] = []
         # Of each log, in lower case, the statement that first writes it.
         self.logs: dict[str, tree.Log] = {}
         self.scope = Scope(symbols=self.symbols)

@@ -65,6 +65,21 @@ def pulse(tokens: TokenStream) -> tree.Pulse:
     return tokens.node(tree.Pulse, start, device, expression(tokens, "a number of seconds", "after FOR"))
 
 
+# timer = "TIMER" name ( "ON" | "OFF" | "TO" expr ) ;
+def timer(tokens: TokenStream) -> tree.SetTimer:
+    """Read one TIMER."""
+    start = tokens.current
+    tokens.accept_word("TIMER")
+    name = tokens.take_name()
+    tokens.check_name_length(name)
+    if tokens.accept("TO"):
+        return tokens.node(tree.SetTimer, start, name, True, expression(tokens, "a number of seconds", "after TO"))
+    word = tokens.accept("ON", "OFF")
+    if word is None:
+        tokens.fail("expected ON, OFF or TO after the name of a timer")
+    return tokens.node(tree.SetTimer, start, name, word.key == "ON")
+
+
 # read = "READ" "VISIONS" "(" lvalue { "," lvalue } ")" | "READ" "SYSTEM" "(" arm ")" ;
 def read(tokens: TokenStream) -> tree.ReadVisions | tree.ReadSystem:
     """Read one READ."""

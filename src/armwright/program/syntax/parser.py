@@ -27,6 +27,7 @@ _RULES: Mapping[str, Rule] = {
     "GRASP": devices.grasp,
     "OPERATE": devices.operate,
     "PULSE": devices.pulse,
+    "TIMER": devices.timer,
     "READ": devices.read,
     "ZERO": devices.zero_force,
     "MOVE": move,

@@ -94,6 +94,15 @@ class Pulse(Node):
 
 
 @attrs.frozen
+class SetTimer(Node):
+    """``TIMER name ON | OFF``, or ``TIMER name TO value``."""
+
+    name: Name
+    on: bool = True
+    value: Expression | None = None
+
+
+@attrs.frozen
 class ReadVisions(Node):
     """``READ VISIONS (frame, frame)``."""
 
@@ -114,7 +123,7 @@ class ZeroForce(Node):
     arm: Mobile
 
 
-DeviceStatement: TypeAlias = Open | Grasp | Operate | Pulse | ReadVisions | ReadSystem | ZeroForce
+DeviceStatement: TypeAlias = Open | Grasp | Operate | Pulse | SetTimer | ReadVisions | ReadSystem | ZeroForce
 
 
 @attrs.frozen

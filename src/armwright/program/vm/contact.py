@@ -42,6 +42,8 @@ def stop_arm(machine: Machine, process: Process, span: Span) -> int:
             motion.rest_tick += _stop_during_stage(machine, motion, local)
             check_others(machine, motion.arm)
         else:
+            if runs:
+                motion.stopped = StoppedOn(runs[-1].trajectory, runs[-1].trajectory.duration)
             _send_and_watch(machine, motion, hold(machine.hardware.sent_configuration(motion.arm, machine.now), period))
     end = max(motion.rest_tick, machine.state.ticks)
     machine.update_hand_pose(motion.arm, span, tick=end)
@@ -60,7 +62,8 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.segments[motion.arm], machine.cell.period
     last = runs[-1]
     stop = braked(arm, last.trajectory, local, period=period)
-    braking, motion.stopped = stop.trajectory, StoppedOn(last.trajectory, stop.reached)
+    braking, course = stop.trajectory, motion.course
+    motion.stopped = StoppedOn(last.trajectory, stop.reached) if course is None else course.stopped(stop.reached)
     loaded = machine.loaded_arm(motion.arm)
     tau = trajectory_efforts(loaded, braking, period, _send_and_watch(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
@@ -118,7 +121,7 @@ def recompute_efforts(machine: Machine, arm: str, stage_index: int | None) -> No
     tau[:done_ticks] = last.tau[:done_ticks]
     machine.state.segments[arm][-1] = attrs.evolve(last, tau=tau)
     if stage_index is not None:
-        peak, when = peak_efforts(model, tau, period)
+        peak, when = peak_efforts(loaded, tau, period)
         stage = machine.state.stages[stage_index]
         machine.state.stages[stage_index] = attrs.evolve(stage, peak_effort=peak, peak_time=when)
 

@@ -1,4 +1,4 @@
-"""OPEN, GRASP, OPERATE, READ and ZERO FORCE."""
+"""OPEN, GRASP, OPERATE, TIMER, READ and ZERO FORCE."""
 
 from collections.abc import Mapping
 
@@ -79,6 +79,28 @@ def _pulse(machine: Machine, process: Process, step: Instruction) -> None:
     machine.record_effect(process, "OPERATE", text, step.span, data={"device": device, "seconds": seconds})
 
 
+def _switch_timer(machine: Machine, process: Process, step: Instruction) -> None:
+    """Let a timer run on, or stop it; it keeps its seconds."""
+    name, timers = str(step.operands[0]), machine.state.timers
+    timers[name] = machine.timer(name), machine.state.ticks if step.operands[1] == "ON" else None
+    _record_timer(machine, process, step, str(step.operands[1]))
+
+
+def _set_timer(machine: Machine, process: Process, step: Instruction) -> None:
+    """Give a timer other seconds; it runs on from there, or stands there."""
+    name, timers = str(step.operands[0]), machine.state.timers
+    seconds = machine.read_number(process, step.operands[1], step.span)
+    _, since = timers.get(name, (0.0, None))
+    timers[name] = seconds, None if since is None else machine.state.ticks
+    _record_timer(machine, process, step, f"TO {seconds:.6g}")
+
+
+def _record_timer(machine: Machine, process: Process, step: Instruction, change: str) -> None:
+    name = str(step.operands[0])
+    data = {"timer": name, "seconds": machine.timer(name), "running": machine.state.timers[name][1] is not None}
+    machine.record_effect(process, "TIMER", f"TIMER {machine.spelling(name)} {change}", step.span, data=data)
+
+
 def _read_visions(machine: Machine, process: Process, step: Instruction) -> None:
     name = machine.resolve_name(process, step.operands[0])
     try:
@@ -113,6 +135,8 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.OPER: _operate,
     Op.OPSET: _set_output,
     Op.PULSE: _pulse,
+    Op.TIMSW: _switch_timer,
+    Op.TIMSET: _set_timer,
     Op.READV: _read_visions,
     Op.READS: _read_system,
     Op.ZEROF: _zero_force,

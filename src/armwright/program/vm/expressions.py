@@ -91,6 +91,10 @@ def _time(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], machine.now, step.span)
 
 
+def _timer(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], machine.timer(str(step.operands[1])), step.span)
+
+
 def _signal(machine: Machine, process: Process, step: Instruction) -> None:
     """Read an input or a device."""
     name, is_input = str(step.operands[1]), step.op in (Op.INPUT, Op.ANALOG)
@@ -115,6 +119,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.FORCE: _force,
     Op.TIME: _time,
     Op.MESSAGE: _message,
+    Op.TIMER: _timer,
     **dict.fromkeys((Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING), _signal),
     Op.TEXT: _text,
     Op.LOADB: _truth,

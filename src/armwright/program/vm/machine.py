@@ -152,6 +152,11 @@ class Machine:
             checked=None if self._collisions is None else self._collisions.checked,
         )
 
+    def timer(self, name: str) -> float:
+        """Return the seconds of a timer; one that was never started has none."""
+        seconds, since = self.state.timers.get(name, (0.0, None))
+        return seconds if since is None else seconds + (self.state.ticks - since) * self.cell.period
+
     # ---- names and values ------------------------------------------------------------------------------------------
 
     def resolve_name(self, process: Process, operand: Operand) -> str:

@@ -427,7 +427,7 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
 def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     """Begin the next stage of a motion."""
     check_late_stage(machine, process, motion)
-    (stage, goal_names, _, clearance, path), period = motion.stages.pop(0), machine.cell.period
+    (stage, goal_names, _, clearance, path, motion.course), period = motion.stages.pop(0), machine.cell.period
     arm, trajectory = machine.cell.arms[motion.arm].arm, stage.trajectory
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.

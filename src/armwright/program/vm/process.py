@@ -200,6 +200,17 @@ class StoppedOn(NamedTuple):
     reached: float
 
 
+class Course(NamedTuple):
+    """How a resumed stage follows its path: the trajectory as it was planned, and the time on that at each time [s]."""
+
+    planned: Trajectory
+    clock: Trajectory
+
+    def stopped(self, t: float) -> StoppedOn:
+        """Return where on the planned trajectory the resumed stage is at a time [s]."""
+        return StoppedOn(self.planned, float(np.clip(self.clock(t)[0], 0.0, self.planned.duration)))
+
+
 class PendingStage(NamedTuple):
     """A stage of a MOVE that has not begun.
 
@@ -209,6 +220,7 @@ class PendingStage(NamedTuple):
         start_tick: when it is to begin [ticks].
         clearance: how near it comes to other bodies; None where that is not looked at.
         path: that was planned past other bodies; None where the straight one of the joints was free.
+        course: of a stage that was stopped and is resumed; None of others.
     """
 
     planned: PlannedStage
@@ -216,6 +228,7 @@ class PendingStage(NamedTuple):
     start_tick: int
     clearance: StageClearance | None = None
     path: PlannedPath | None = None
+    course: Course | None = None
 
 
 class Threat(NamedTuple):
@@ -267,7 +280,8 @@ class Motion:
         deepest_contact: the deepest contact so far.
         paths: the paths past other bodies that were planned for its stages.
         early_end: what ended it before its goal; None where nothing did.
-        stopped: where its present stage was stopped; None where that runs, or is at its end.
+        course: of its present stage, where that was resumed; None where it was not.
+        stopped: where its present stage was stopped, which may be its end; None where that runs.
     """
 
     arm: str
@@ -293,6 +307,7 @@ class Motion:
     deepest_contact: PeakContact = attrs.field(factory=lambda: PeakContact(0.0, 0.0))
     paths: tuple[PlannedPath, ...] = ()
     early_end: EarlyEnd | None = None
+    course: Course | None = None
     stopped: StoppedOn | None = None
 
     @property

@@ -39,7 +39,7 @@ _TICK_TOLERANCE = 1e-6
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
 _MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP", "BRAKE", "RESUME"]
 EffectKind: TypeAlias = (
-    TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "WHEN", "LOCK", "PRINT", "LOG", "ERROR", "END"]
+    TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "WHEN", "TIMER", "LOCK", "PRINT", "LOG", "ERROR", "END"]
 )
 # Not of the trace: assignments, locks and the end of the text.
 _SILENT = ("PLACE", "LOCK", "END")

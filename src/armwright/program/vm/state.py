@@ -46,6 +46,7 @@ class MachineState:
         tree: where frames are, and what they hang on.
         values: of variables that are no frames.
         events: how often each was signalled and not yet waited for.
+        timers: of each timer its seconds, and since which tick it runs; None where it is stopped.
         locks: which process holds each variable that is locked.
         owners: the processes that use each arm.
         hands: the gripper of each arm.
@@ -75,6 +76,7 @@ class MachineState:
     processes: list[Process]
     values: dict[str, float | bool | str | Array] = attrs.field(factory=dict)
     events: dict[str, int] = attrs.field(factory=dict)
+    timers: dict[str, tuple[float, int | None]] = attrs.field(factory=dict)
     locks: dict[str, Process] = attrs.field(factory=dict)
     owners: dict[str, list[Process]] = attrs.field(factory=dict)
     pose_origins: dict[str, Span] = attrs.field(factory=dict)

@@ -8,17 +8,17 @@ import numpy as np
 from armwright.motion.limited import resumed
 from armwright.motion.plan import PlannedStage, tool_path_length
 from armwright.motion.quintic_polynomials import point_to_point
-from armwright.motion.trajectory import Trajectory, whole_ticks
+from armwright.motion.trajectory import whole_ticks
 from armwright.program.bytecode.instructions import Instruction, Op
 from armwright.program.vm.calls import evaluate_instructions, return_
 from armwright.program.vm.machine import Handler, Machine, jump_target
 from armwright.program.vm.move import brake_motion, finish_move, start_stage, stop_motion
 from armwright.program.vm.move_request import READS_POSES, operations
-from armwright.program.vm.process import EarlyEnd, Interruption, Motion, PendingStage, Process, Watch
+from armwright.program.vm.process import Course, EarlyEnd, Interruption, Motion, PendingStage, Process, Watch
 from armwright.program.vm.synchronization import record_wait
 
 # Values that change without a statement of the program.
-_READS_OUTSIDE = frozenset((Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING))
+_READS_OUTSIDE = frozenset((Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.TIMER))
 # An arm so near to where it was braked has not been moved since [rad] or [m].
 _SAME_CONFIGURATION = 1e-9
 # No stage begins then: its path is checked for collisions anew.
@@ -221,17 +221,19 @@ def _resume(machine: Machine, process: Process, step: Instruction) -> None:
 
 def _stages_to_go_on(machine: Machine, motion: Motion) -> list[PendingStage]:
     """Return the stages that lead a braked arm back to its path, where it has left that, and along the rest of it."""
-    if motion.stopped is None:
-        return []
-    arm, period = machine.cell.arms[motion.arm].arm, machine.cell.period
-    run, q = machine.state.stages[motion.stage_index], machine.hardware.sent_configuration(motion.arm, machine.now)
-    rest = resumed(arm, *motion.stopped, period=period)
-    stage = attrs.evolve(run.stage, trajectory=rest, length=tool_path_length(arm, rest))
-    stages = [PendingStage(stage, run.goal_names, _NEVER, run.clearance, run.path)]
-    if np.abs(q - rest(0.0)).max() > _SAME_CONFIGURATION:
-        back: Trajectory = whole_ticks(point_to_point(arm, q, rest(0.0), motion.speed), period)
-        planned = PlannedStage(kind="PTP", trajectory=back, length=tool_path_length(arm, back))
-        stages.insert(0, PendingStage(planned, ("its path",), _NEVER))
+    assert motion.stopped is not None  # noqa: S101 - it has been braked
+    arm, period, (planned, reached) = machine.cell.arms[motion.arm].arm, machine.cell.period, motion.stopped
+    stages = []
+    if reached < planned.duration:
+        run = machine.state.stages[motion.stage_index]
+        rest, clock = attrs.astuple(resumed(arm, planned, reached, period=period), recurse=False)
+        stage = attrs.evolve(run.stage, trajectory=rest, length=tool_path_length(arm, rest))
+        stages.append(PendingStage(stage, run.goal_names, _NEVER, run.clearance, run.path, Course(planned, clock)))
+    q = machine.hardware.sent_configuration(motion.arm, machine.now)
+    if np.abs(q - planned(reached)).max() > _SAME_CONFIGURATION:
+        back = whole_ticks(point_to_point(arm, q, planned(reached), motion.speed), period)
+        to_path = PlannedStage(kind="PTP", trajectory=back, length=tool_path_length(arm, back))
+        stages.insert(0, PendingStage(to_path, ("its path",), _NEVER))
     return stages
 
 

@@ -1,7 +1,46 @@
-// What stands around the arms: devices that are switched, cameras that look.
+// What stands around the arms: devices and inputs that are switched, cameras that look.
 
 const AGAIN = 300; // a live camera looks again so long after its latest picture [ms]
 const looking = { timer: null };
+
+function switchButton(text, press) {
+  const button = make("button", { type: "button" }, make("span", { textContent: text }), make("b"));
+  button.setAttribute("role", "switch");
+  button.addEventListener("click", () => press(button.ariaChecked !== "true"));
+  return button;
+}
+
+function showSwitch(button, on, disabled) {
+  button.ariaChecked = String(on);
+  button.lastChild.textContent = on ? "on" : "off";
+  button.disabled = disabled;
+}
+
+function inputField(input) {
+  const field = make("input", { type: "number", step: "any" });
+  field.addEventListener("change", () => field.value && send({ do: "input", input, value: Number(field.value) }));
+  return make("label", { className: "fields" }, make("span", { textContent: input }), field);
+}
+
+// A switch for each digital input, a number for each analogue one; both may be set in a run.
+function fillInputs(inputs) {
+  const names = Object.keys(inputs);
+  const list = byId("inputs");
+  byId("inputs-card").hidden = !names.length;
+  if (list.dataset.names !== JSON.stringify(names)) {
+    list.dataset.names = JSON.stringify(names);
+    const one = (input) => (inputs[input].analogue ? inputField(input) : switchButton(input, (on) => send({ do: "input", input, value: Number(on) })));
+    list.replaceChildren(...names.map((input) => make("li", {}, one(input))));
+  }
+  names.forEach((name, i) => {
+    const { value, analogue } = inputs[name];
+    const control = list.children[i].firstChild;
+    if (!analogue) return showSwitch(control, value !== 0, !mine());
+    const field = control.lastChild;
+    field.disabled = !mine();
+    if (document.activeElement !== field) field.value = Number(value.toPrecision(6));
+  });
+}
 
 function fillDevices(devices) {
   const names = Object.keys(devices);
@@ -10,19 +49,11 @@ function fillDevices(devices) {
   if (list.dataset.names !== JSON.stringify(names)) {
     list.dataset.names = JSON.stringify(names);
     list.replaceChildren(
-      ...names.map((device) => {
-        const button = make("button", { type: "button" }, make("span", { textContent: device }), make("b"));
-        button.setAttribute("role", "switch");
-        button.addEventListener("click", () => send({ do: "operate", device, on: button.ariaChecked !== "true" }));
-        return make("li", {}, button);
-      }),
+      ...names.map((device) => make("li", {}, switchButton(device, (on) => send({ do: "operate", device, on })))),
     );
   }
   names.forEach((name, i) => {
-    const button = list.children[i].firstChild;
-    button.ariaChecked = String(devices[name]);
-    button.lastChild.textContent = devices[name] ? "on" : "off";
-    button.disabled = !mine() || Boolean(live.state.run);
+    showSwitch(list.children[i].firstChild, devices[name], !mine() || Boolean(live.state.run));
   });
 }
 
@@ -53,7 +84,8 @@ function startCellPanel() {
   followers.push((state) => {
     if (!state) return;
     fillDevices(state.devices);
-    byId("cell-empty").hidden = Boolean(cameras.length || Object.keys(state.devices).length);
+    fillInputs(state.inputs);
+    byId("cell-empty").hidden = Boolean(cameras.length || Object.keys({ ...state.devices, ...state.inputs }).length);
     if (state.picture !== undefined) takePicture(state.picture, byId("seen-picture"), byId("seen-text"));
     byId("seen-card").hidden = byId("seen-picture").hidden;
   });
