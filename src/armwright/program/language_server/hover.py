@@ -16,6 +16,7 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.keyword_docs import word_doc
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
+from armwright.program.records.layout import RecordVariable
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -104,6 +105,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.PROCEDURE if procedure is not None:
             line = analysis.compiled.source.place(procedure.node.name.span.start)
             description = signature(procedure.node)[0], [f"declared in line {line}"]
+        case NameKind.UNKNOWN if (record := analysis.record(occurrence)) is not None:
+            description = _describe_record(analysis, record)
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
         case NameKind.UNIT if key in UNITS:
@@ -117,6 +120,12 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             description = word.syntax + value, [word.text]
     return description
+
+
+def _describe_record(analysis: Analysis, record: RecordVariable) -> _Description:
+    fields = (f"{record.type.names[key].text} : {kind.text}" for key, kind in record.type.fields.items())
+    line = analysis.compiled.source.place(record.name.span.start)
+    return f"{record.name.text} : {record}", [f"fields: {', '.join(fields)}", f"declared in line {line}"]
 
 
 def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:
