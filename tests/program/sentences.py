@@ -13,6 +13,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "TEXT": ("TEXT", "text"),
     "MODULE": ("MODULE", "module"),
     "AS": ("AS", "as"),
+    "RECORD": ("RECORD", "record"),
     "CONST": ("CONST", "const"),
     "FUNCTION": ("FUNCTION", "function"),
     "MODE": ("IN", "INOUT", "inout"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from armwright.errors import FileFormatError
 from armwright.program import Compilation, KnownCell, Source, compile as translate
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import ImportedFrames, ReadImport
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, ReadImport
 
 ONE_ARM = KnownCell(
     arms=frozenset({"ARM_1"}),
@@ -27,6 +27,7 @@ CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|
 STRICT = re.compile(r"// strict$", re.MULTILINE)
 OLD = re.compile(r"// std=83$", re.MULTILINE)
 IMPORT = re.compile(r"// import: (\S+): (.*)")
+MODULE = re.compile(r"// module: (\S+): (.*)")
 
 
 def expectations(text: str) -> list[tuple[str, int]]:
@@ -62,12 +63,16 @@ def imports_of(text: str) -> ReadImport | None:
     """Return a reader of the files that the comments of a program tell of; any other file is missing."""
     files = {path: hanging(re.split(r",\s*", names.strip())) for path, names in IMPORT.findall(text)}
 
-    def read(path: str) -> ImportedFrames:
+    modules = dict(MODULE.findall(text))
+
+    def read(path: str) -> ImportedFrames | ImportedModule:
+        if path in modules:
+            return ImportedModule(text=modules[path])
         if path not in files:
             raise FileFormatError(path, None, "", "there is no such file")
         return ImportedFrames(frames=files[path])
 
-    return read if files else None
+    return read if files or modules else None
 
 
 def compile_file(path: Path) -> Compilation:

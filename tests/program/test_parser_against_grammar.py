@@ -43,6 +43,7 @@ WORDS = {
         "torque",
         "const",
         "module",
+        "record",
         "as",
         "text",
         "boolean",

@@ -22,11 +22,13 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
 from armwright.program.language.diagnostic import Diagnostic, sort_diagnostics
+from armwright.program.language.names import is_module
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.modules.files import ParsedFile, parse_file, read_files
 from armwright.program.modules.linking import LinkedProgram, check_module, link
 from armwright.program.modules.names import declared_names
+from armwright.program.records.layout import RecordVariable, lay_out
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.cell_symbols import (
@@ -34,7 +36,6 @@ from armwright.program.semantics.cell_symbols import (
     ImportedModule,
     KnownCell,
     ReadImport,
-    is_module,
     known_cell,
 )
 from armwright.program.semantics.symbols import Symbols
@@ -68,9 +69,11 @@ class Compilation:
             it imports; None where there is none, or only its names are known.
         cell_symbols: what was known of the cell when the program was checked.
         strict: whether an AFFIX that is only implied is an error.
-        whole: what it says together with all modules, in which every name stands for one thing.
+        whole: what it says together with all modules, in which every name stands for one thing, and of records for
+            one field.
         spelling: how the names of the whole are written, by their keys.
         brought: the names that modules give, as this file may write them, with their keys in the whole.
+        records: the variables that are records, by key: of the program, under the empty text, and of each procedure.
     """
 
     source: Source
@@ -89,6 +92,7 @@ class Compilation:
     whole: Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
     spelling: Mapping[str, str] = attrs.field(factory=dict)
     brought: Mapping[str, str] = attrs.field(factory=dict)
+    records: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -394,8 +398,9 @@ def _check_names(
         linked = LinkedProgram(tree=main.tree, exported=frozenset(exported), diagnostics=check_module(main.tree))
     else:
         linked = link(files, cell_symbols.frames if cell_symbols is not None else ())
+    laid_out = lay_out(linked.tree)
     symbols, name_errors, imports = check.check(
-        linked.tree,
+        laid_out.tree,
         cell_symbols,
         std=std,
         read_import=read_import,
@@ -403,7 +408,7 @@ def _check_names(
         exported=linked.exported,
         has_unknown_names=files is not None and files.has_unknown_names,
     )
-    diagnostics = [*main.diagnostics, *linked.diagnostics]
+    diagnostics = [*main.diagnostics, *linked.diagnostics, *laid_out.diagnostics]
     guessed = any(diagnostic.is_syntax for diagnostic in diagnostics)
     # Where the parser had to guess, a name may seem unused.
     diagnostics += [error for error in name_errors if not (guessed and error.code == "L304")]
@@ -413,9 +418,10 @@ def _check_names(
         tokens=main.tokens,
         comments=main.scanned.comments,
         tree=main.tree,
-        whole=linked.tree,
+        whole=laid_out.tree,
+        records=laid_out.variables,
         brought=linked.brought,
-        spelling=_name_spellings((main,) if files is None else files.files.values(), linked),
+        spelling=_name_spellings((main,) if files is None else files.files.values(), laid_out.tree),
         symbols=symbols,
         imports=imports,
         flow=None,
@@ -450,9 +456,15 @@ def _generate_code(compiled: Compilation) -> Compilation:
     return attrs.evolve(compiled, code=attrs.evolve(code, standard=compiled.standard))
 
 
-def _name_spellings(files: Iterable[ParsedFile], linked: LinkedProgram) -> dict[str, str]:
+def _name_spellings(files: Iterable[ParsedFile], whole: Program) -> dict[str, str]:
     """Return how a program first writes each of its names, its own file before those of its modules."""
     tokens = [token for file in files for token in reversed(file.tokens) if token.kind is TokenKind.NAME]
     spelling = {token.key: token.text for token in tokens}
-    qualified = (name for name in declared_names(linked.tree).values() if "." in name.key)
-    return spelling | {name.key: f"{name.key.partition('.')[0].lower()}.{name.text}" for name in qualified}
+    qualified = (name for name in declared_names(whole).values() if "." in name.key and name.key not in spelling)
+    return spelling | {name.key: _spelled(name) for name in qualified}
+
+
+def _spelled(name: tree.Name) -> str:
+    """Return a name with a point in it as a program may write it: a field of a record, or a name of a module."""
+    is_field = name.text.count(".") == name.key.count(".")
+    return name.text if is_field else f"{name.key.partition('.')[0].lower()}.{name.text}"

@@ -16,9 +16,10 @@ from armwright.files.output import write_back
 from armwright.program.api import Compilation, compile as compile_program, import_reader
 from armwright.program.flow_analysis.side_effects import walk_statements
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.names import is_module
 from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCodec, column_count
 from armwright.program.language.source import Source
-from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, is_module
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule
 from armwright.program.syntax.nodes import ArmName, Name
 from armwright.program.syntax.tree import Blend, Circularly, Directly, Move, Straightly, Via, clause_word
 

@@ -8,6 +8,16 @@ from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
 
 
+def block(context: Context, node: tree.Block) -> None:
+    """Generate the statements of a block; the fields of a record get their values in one."""
+    if not node.is_assignment:
+        context.generate_list(*node.statements)
+        return
+    context.out.begin()
+    for statement in node.statements:
+        context.generators[type(statement)](context, statement)
+
+
 def if_(context: Context, node: tree.If) -> None:
     """Generate an IF with the ELSE IFs behind it."""
     out = context.out
@@ -175,7 +185,7 @@ def call(context: Context, node: tree.Call) -> None:
 
 
 GENERATORS: Generators = {
-    tree.Block: lambda context, node: context.generate_list(*node.statements),
+    tree.Block: block,
     tree.If: if_,
     tree.While: while_,
     tree.Repeat: repeat,

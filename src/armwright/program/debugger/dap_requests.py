@@ -27,8 +27,8 @@ from armwright.program.semantics.builtins import FUNCTIONS
 # So many elements are sent to an editor that does not say how many it wants.
 _MAX_ELEMENTS = 1000
 # What gives a variable or an element a value.
-_ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
-_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+_ASSIGNMENT = re.compile(r"([A-Za-z][\w.-]*(?:\s*\[[^\[\]]*\](?:\.\w+)?)?)\s*=\s*(.+)", re.DOTALL)
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_.]*$")
 _CAPABILITIES = {
     "supportsConfigurationDoneRequest": True,
     "supportsConditionalBreakpoints": True,

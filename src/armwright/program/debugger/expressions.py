@@ -48,7 +48,7 @@ class CheckedExpression:
 
 def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
-    frames = (name for name in machine.state.tree if not set(name) & set(".'["))
+    frames = (name for name in machine.state.tree if not name.endswith(".BASE") and not set(name) & set("'["))
     local = {} if procedure is None else machine.code.procedures[procedure].types
     cell = {name: VariableType(VariableKind.FRAME) for name in frames if name not in machine.cell.arms}
     return {**cell, **PREDECLARED, **machine.code.types, **local}

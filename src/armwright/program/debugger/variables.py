@@ -66,7 +66,11 @@ def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
 
 def frame_names(machine: Machine) -> list[str]:
     """Return the single frames of a program and its cell, bases of arms and variables of procedures aside."""
-    return [name for name in machine.state.tree if name != WORLD and not set(name) & set(".'[")]
+    return [
+        name
+        for name in machine.state.tree
+        if name != WORLD and not name.endswith(".BASE") and not set(name) & set("'[")
+    ]
 
 
 def make_variable(machine: Machine, slot: str, *, name: str = "") -> Variable:

@@ -115,6 +115,11 @@ class _Layout:
         row = self.rows[start] = Row(column, continuation, column + comment_indent)
         return row
 
+    def _end_index(self, node: tree.Record) -> int:
+        """Return the piece that is the END of a record."""
+        index = self._index[node.fields[-1].span.start] if node.fields else self._index[node.span.start]
+        return next(at for at in range(index, len(self._pieces)) if self._pieces[at].word == "END")
+
     def _before(self, start: int) -> Piece:
         """Return the piece in front of the one that starts at an offset."""
         return self._pieces[self._index[start] - 1]
@@ -126,6 +131,10 @@ class _Layout:
                 self._declaration(header)
                 continue
             self._row(header.span.start, 0)
+            if isinstance(header, tree.Record):
+                for field in header.fields:
+                    self._row(field.span.start, INDENT)
+                self._row(self._pieces[self._end_index(header)].start, 0)
             if isinstance(header, tree.Procedure):
                 for declaration in header.declarations:
                     self._declaration(declaration)

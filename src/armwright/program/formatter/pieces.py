@@ -189,13 +189,19 @@ class _Names:
         start, key = token.start, token.key
         if start in self._declared:
             return token.text
+        if "." in key and (owner := self._spelt(attrs.evolve(token, key=key.partition(".")[0]))) is not None:
+            return f"{owner}.{token.text.partition('.')[2]}"
         if follows == "(":
             return self._procedures.get(key) or (key if key in FUNCTIONS else token.text)
-        while self._own and self._own[-1][0].end <= start:
+        return self._spelt(token) or self._procedures.get(key) or token.text
+
+    def _spelt(self, token: Token) -> str | None:
+        """Return a variable as it is declared; None where it is not."""
+        while self._own and self._own[-1][0].end <= token.start:
             self._own.pop()
-        if self._own and self._own[-1][0].start <= start and (own := self._own[-1][1].get(key)):
+        if self._own and self._own[-1][0].start <= token.start and (own := self._own[-1][1].get(token.key)):
             return own
-        return self._globals.get(key) or self._procedures.get(key) or token.text
+        return self._globals.get(token.key)
 
 
 def _declared_in(declarations: Sequence[tree.Declaration]) -> Iterator[tree.Name]:

@@ -54,7 +54,7 @@ def set_blanks(pieces: Sequence[Piece]) -> None:
         is_operator = word in _ARITHMETIC
         if last == ",":
             _behind_comma(piece, brackets)
-        elif word in _NOTHING_BEFORE or last in _OPENING or is_behind_minus:
+        elif word in _NOTHING_BEFORE or last in _OPENING or last == "." or is_behind_minus:
             piece.blank = False
         elif word in _OPENING:
             piece.blank = not _is_attached(piece, before, earlier) and not (is_behind_operator and brackets)

@@ -6,6 +6,15 @@ import re
 LOG_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,40}")
 
 
+# Suffix of the files of programs and modules.
+MODULE_SUFFIX = ".rlo"
+
+
+def is_module(path: str) -> bool:
+    """Whether an IMPORT of this file brings a module, and not the frames of a cell."""
+    return path.lower().endswith(MODULE_SUFFIX)
+
+
 def is_arm(name: str) -> bool:
     """Whether a canonical name is that of an arm; no other name has its form."""
     return name.startswith("ARM_") and name[4:].isdecimal()

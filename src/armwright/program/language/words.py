@@ -64,7 +64,7 @@ VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE", "MESSAGE"))
 
 # Types, and what starts a part in front of BEGIN, that are reserved nowhere: programs may use all of them as names.
 TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
-HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE")
+HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE", "RECORD")
 # How a parameter is passed, in front of its name.
 PARAMETER_MODES = ("IN", "INOUT")
 # Clauses of MOVE that are words only where a clause may begin.

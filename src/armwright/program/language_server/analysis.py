@@ -21,13 +21,21 @@ from armwright.program.api import (
 )
 from armwright.program.flow_analysis.side_effects import walk_statements
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.names import is_module
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.positions import span_range
-from armwright.program.language_server.symbol_index import Occurrence, ScopeExtents, occurrences, scope_extents
-from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule, is_module
+from armwright.program.language_server.symbol_index import (
+    NameKind,
+    Occurrence,
+    ScopeExtents,
+    occurrences,
+    scope_extents,
+)
+from armwright.program.records.layout import RecordVariable
+from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers
@@ -160,9 +168,19 @@ class Analysis:
         """Return all occurrences of the same thing."""
         return tuple(other for other in self.occurrences if other.refers_to_same(occurrence))
 
+    def record(self, occurrence: Occurrence) -> RecordVariable | None:
+        """Return the record that a name stands for as a whole; None where it stands for something else."""
+        if occurrence.kind is not NameKind.UNKNOWN:
+            return None
+        procedure, records = self.scopes.scope_at(occurrence.start).procedure, self.compiled.records
+        local = {} if procedure is None else records.get(procedure.node.name.key, {})
+        return local.get(occurrence.key) or records.get("", {}).get(occurrence.key)
+
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""
         symbols = self.compiled.symbols
+        if (record := self.record(occurrence)) is not None:
+            return record.name
         if occurrence.owner is not None:
             return symbols.procedures[occurrence.owner].declared.get(occurrence.key)
         if occurrence.key in symbols.procedures:

@@ -60,6 +60,7 @@ _SNIPPETS = {
     ),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "MODULE": (("MODULE ...", "MODULE ${1:name} ;"),),
+    "RECORD": (("RECORD ...", "RECORD ${1:name} ;\n  ${2:field} : ${3:SCALAR} ;\nEND ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
     "FUNCTION": (("FUNCTION ...", "FUNCTION ${1:name} (${2:n : SCALAR}) : SCALAR ;\nBEGIN\n  RETURN $0\nEND ;"),),
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),

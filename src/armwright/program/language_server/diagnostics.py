@@ -7,9 +7,9 @@ from lsprotocol import types as lsp
 
 from armwright.errors import counted
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.names import is_module
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.positions import span_range
-from armwright.program.semantics.cell_symbols import is_module
 
 # So many errors of a module are pointed at from the program that imports it.
 _MAX_SHOWN = 20

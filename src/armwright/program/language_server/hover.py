@@ -16,6 +16,7 @@ from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.keyword_docs import word_doc
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
+from armwright.program.records.layout import RecordVariable
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -111,6 +112,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.PROCEDURE if procedure is not None:
             line = analysis.compiled.source.place(procedure.node.name.span.start)
             description = signature(procedure.node)[0], [f"declared in line {line}"]
+        case NameKind.UNKNOWN if (record := analysis.record(occurrence)) is not None:
+            description = _describe_record(analysis, record)
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
         case NameKind.TARGET:
@@ -133,6 +136,12 @@ def _describe_plain(kind: NameKind, key: str) -> str:
         return f"the {key.lower()} axis"
     own = "a kind of error of the program, which RAISE raises and RECOVER may name"
     return f"a kind of error: {KINDS[key]}" if key in KINDS else own
+
+
+def _describe_record(analysis: Analysis, record: RecordVariable) -> _Description:
+    fields = (f"{record.type.names[key].text} : {kind.text}" for key, kind in record.type.fields.items())
+    line = analysis.compiled.source.place(record.name.span.start)
+    return f"{record.name.text} : {record}", [f"fields: {', '.join(fields)}", f"declared in line {line}"]
 
 
 def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:

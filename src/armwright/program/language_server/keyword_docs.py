@@ -35,6 +35,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         'IMPORT "file" [AS name] ;',
         "Imports the names of a module, or the frames of a cell file, and its arms if no other cell is specified.",
     ),
+    "RECORD": (
+        "RECORD name ; field, field : TYPE ; ... END ;",
+        "Declares a type whose variables have named fields, written `variable.field`.",
+    ),
     "AS": ('IMPORT "file.rlo" AS name ;', "The names of the module are written `name.x` in this file."),
     "PROCEDURE": (
         "PROCEDURE name (a, b : TYPE, c : TYPE) ; [VAR ...] BEGIN ... END ;",

@@ -40,6 +40,8 @@ def renameable_occurrence(analysis: Analysis, offset: int) -> Occurrence:
     text = analysis.text[occurrence.start : occurrence.end]
     if occurrence.kind in _NOT_RENAMEABLE:
         raise InvalidValueError(f"`{text}` is {_NOT_RENAMEABLE[occurrence.kind]} and cannot be renamed")
+    if "." in occurrence.key or analysis.record(occurrence) is not None:
+        raise InvalidValueError(f"`{text}` is a record or a part of something and cannot be renamed")
     declared, source = analysis.declaration(occurrence), analysis.compiled.source
     if declared is not None and (file := source.file_number(declared.span.start)):
         raise InvalidValueError(f"`{text}` is declared in {source.file_path(file)} and cannot be renamed here")

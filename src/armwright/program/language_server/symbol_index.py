@@ -88,6 +88,14 @@ class ScopeExtents:
     scopes: Sequence[Scope]
     brought: Mapping[str, str] = attrs.field(factory=dict)
 
+    def meant(self, key: str, scope: Scope) -> str:
+        """Return the key in the whole program of a name, which may be a field of a variable of a module."""
+        parts = key.split(".")
+        for count in range(len(parts), 1 if scope.is_local(parts[0]) else 0, -1):
+            if (known := self.brought.get(".".join(parts[:count]))) is not None:
+                return ".".join((known, *parts[count:]))
+        return key
+
     def scope_at(self, offset: int) -> Scope:
         """Return the names that are visible at a position."""
         return self.scopes[bisect_right(self.starts, offset) - 1]
@@ -130,12 +138,7 @@ def occurrences(tokens: Sequence[Token], scopes: ScopeExtents) -> tuple[Occurren
         kind, key = token.kind, token.key
         if kind is _NAME or kind is _ARM:
             next_key = tokens[index + 1].key if index + 1 < len(tokens) else ""
-            if kind is _ARM:
-                name = Occurrence(token.start, token.end, key, NameKind.ARM)
-            else:
-                scope = scopes.scope_at(token.start)
-                meant = key if scope.is_local(key) else scopes.brought.get(key, key)
-                name = _classify_name(token, meant, scope, previous, next_key, in_units=in_units)
+            name = _occurrence(token, scopes, previous, next_key, in_units=in_units)
             result.append(name)
             if previous == "RAISE" or (in_recover and previous in ("(", ",")):
                 name.kind, name.owner, name.type, name.declares = NameKind.ERROR, None, None, False
@@ -161,6 +164,19 @@ def _classify_argument(name: Occurrence, function: str, next_key: str) -> None:
         name.kind, name.owner, name.type = NameKind.TIMER if function == "TIMER" else NameKind.DEVICE, None, None
     elif function == JOINTS and next_key == ")" and name.kind is NameKind.UNKNOWN:
         name.kind = NameKind.TARGET
+
+
+def _occurrence(token: Token, scopes: ScopeExtents, previous: str, next_key: str, *, in_units: bool) -> Occurrence:
+    """Return what a name or an arm is between the tokens around it."""
+    start, end, key = token.start, token.end, token.key
+    if token.kind is _ARM:
+        return Occurrence(start, end, key, NameKind.ARM)
+    if previous == ".":
+        # The field of an element of an array.
+        return Occurrence(start, end, key, NameKind.UNKNOWN)
+    scope = scopes.scope_at(start)
+    meant = key if scope.is_local(key) else scopes.meant(key, scope)
+    return _classify_name(token, meant, scope, previous, next_key, in_units=in_units)
 
 
 def _classify_name(token: Token, key: str, scope: Scope, previous: str, next_key: str, *, in_units: bool) -> Occurrence:

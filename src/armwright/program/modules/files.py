@@ -6,9 +6,10 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList
+from armwright.program.language.names import is_module
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
-from armwright.program.semantics.cell_symbols import ImportedModule, ReadImport, is_module
+from armwright.program.semantics.cell_symbols import ImportedModule, ReadImport
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import ScannedText, Token, scan
 from armwright.program.syntax.line_numbers import blank_line_numbers

@@ -6,13 +6,12 @@ from typing import get_args
 import attrs
 
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, labels
-from armwright.program.language.names import is_arm
+from armwright.program.language.names import is_arm, is_module
 from armwright.program.language.units import DECLARABLE, dimension
 from armwright.program.modules.files import ParsedFile, ProgramFiles, beside
 from armwright.program.modules.names import FileNames, Meaning, file_names, unknown_member
 from armwright.program.modules.rewriting import Rewriter
 from armwright.program.semantics.builtins import FUNCTIONS, WITH_NAME
-from armwright.program.semantics.cell_symbols import is_module
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 
@@ -102,7 +101,11 @@ class _Linker:
             case tree.Module() | tree.Units():
                 linked = header if self._is_main else None
             case tree.Declaration():
-                linked = attrs.evolve(header, names=tuple(map(self._declared, header.names)))
+                names = tuple(map(self._declared, header.names))
+                linked = attrs.evolve(header, names=names, type=self._type(header.type))
+            case tree.Record():
+                fields = tuple(attrs.evolve(field, type=self._type(field.type)) for field in header.fields)
+                linked = attrs.evolve(header, name=self._declared(header.name), fields=fields)
             case tree.Constant():
                 linked = tree.Constant(header.span, self._declared(header.name), self._rewriter(header.value))
             case tree.Procedure():
@@ -114,7 +117,20 @@ class _Linker:
         self._local = frozenset(name.key for declaration in own for name in declaration.names)
         body = attrs.evolve(node.body, statements=tuple(self.statements(node.body.statements)))
         self._local = frozenset()
-        return attrs.evolve(node, name=self._declared(node.name), body=body)
+        parameters, declarations = (
+            tuple(attrs.evolve(one, type=self._type(one.type)) for one in part)
+            for part in (node.parameters, node.declarations)
+        )
+        return attrs.evolve(
+            node, name=self._declared(node.name), parameters=parameters, declarations=declarations, body=body
+        )
+
+    def _type(self, node: tree.TypeName) -> tree.TypeName:
+        """Return a type with the name that a record has in the whole program."""
+        if node.record is None:
+            return node
+        record = self._linked(node.record)
+        return attrs.evolve(node, record=record if isinstance(record, tree.Name) else None)
 
     def _declared(self, name: tree.Name) -> tree.Name:
         meaning = self._names.own.get(name.key)
@@ -125,15 +141,26 @@ class _Linker:
 
     def _meanings(self, key: str) -> list[Meaning]:
         """Return what a name stands for in the file, outside of its procedures; several where modules clash."""
-        if (own := self._names.own.get(key)) is not None:
-            return [own]
         module, point, member = key.partition(".")
         if point and (brought := self._names.modules.get(module)) is not None:
             return [brought[member]] if member in brought else []
-        return self._names.visible.get(key, [])
+        own = self._names.own.get(key)
+        return self._names.visible.get(key, []) if own is None else [own]
 
     def _variable(self, name: tree.Name) -> tree.Name | tree.Poison:
-        return name if name.key in self._local or is_arm(name.key) else self._linked(name)
+        owner, field = self._split(name.key)
+        if owner in self._local or is_arm(name.key):
+            return name
+        if not field:
+            return self._linked(name)
+        linked = self._linked(attrs.evolve(name, key=owner))
+        return attrs.evolve(name, key=f"{linked.key}.{field}") if isinstance(linked, tree.Name) else linked
+
+    def _split(self, key: str) -> tuple[str, str]:
+        """Return a variable and the field of it that a name stands for; empty without one."""
+        parts = key.split(".")
+        count = 2 if parts[0] in self._names.modules and parts[0] not in self._local else 1
+        return ".".join(parts[:count]), ".".join(parts[count:])
 
     def _procedure(self, name: tree.Name) -> tree.Name | tree.Poison:
         linked = self._linked(name)

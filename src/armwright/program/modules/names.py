@@ -60,7 +60,8 @@ def declared_names(program: tree.Program) -> dict[str, tree.Name]:
     """Return the names of the program's level that a file declares, by key."""
     variables = (name for declaration in program.declarations for name in declaration.names)
     constants = (constant.name for constant in program.constants)
-    names = (*variables, *constants, *(procedure.name for procedure in program.procedures))
+    records = (record.name for record in program.records)
+    names = (*variables, *constants, *records, *(procedure.name for procedure in program.procedures))
     return {name.key: name for name in reversed(names) if name.key not in PREDECLARED}
 
 
@@ -132,6 +133,10 @@ def _import_names(program: ProgramFiles, seen: Mapping[str, FileNames], path: st
             text = f"two modules are called `{called.text}` here"
             advice = f'write `IMPORT "{node.path.value}" AS name`, with a name of its own'
             diagnostics.report("E252", text, (node.alias or node.path).span, "the second", advice=advice)
+        if (own := names.own.get(called.key)) is not None:
+            text, here = f"`{called.text}` is a module here and something else", labels(own.declared.span, "the other")
+            advice = f'write `IMPORT "{node.path.value}" AS name`, with a name of its own'
+            diagnostics.report("E252", text, (node.alias or node.path).span, "one name", secondary=here, advice=advice)
         if node.alias is not None or other is not brought:
             continue
         for key, meaning in brought.items():

@@ -29,16 +29,22 @@ class Rewriter:
         variable: of the name of a variable.
         procedure: of a name in front of ``(``.
         is_special: whether the arguments of a function are no variables, such as an axis.
+        replace: gives what a whole node becomes; None where its names are looked at one by one.
     """
 
     variable: Rename
     procedure: Rename
     is_special: Callable[[tree.Function], bool]
+    replace: Callable[[tree.Node], tree.Node | None] = lambda _node: None
 
     def __call__(self, node: Any) -> Any:
         """Return a node with other names, or a Poison; the node itself where nothing changes."""
         if isinstance(node, _LEAVES) or (isinstance(node, tree.Function) and self.is_special(node)):
             return node
+        replaced = self.replace(node)
+        return self._renamed(node) if replaced is None else replaced
+
+    def _renamed(self, node: Any) -> Any:
         match node:
             case tree.Name():
                 return self.variable(node)

@@ -9,8 +9,6 @@ from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
 
 STATION = "STATION"
-# Suffix of the files of programs and modules.
-MODULE_SUFFIX = ".rlo"
 
 
 @attrs.frozen(kw_only=True)
@@ -64,11 +62,6 @@ class ImportedModule:
     text: str
 
 
-def is_module(path: str) -> bool:
-    """Whether an IMPORT of this file brings a module, and not the frames of a cell."""
-    return path.lower().endswith(MODULE_SUFFIX)
-
-
 # Reads the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
 ReadImport: TypeAlias = Callable[[str], ImportedFrames | ImportedModule]
 
@@ -89,4 +82,4 @@ def known_cell(cell: Cell) -> KnownCell:
     )
 
 
-__all__ = ["STATION", "WORLD", "ImportedFrames", "ImportedModule", "KnownCell", "ReadImport", "is_module", "known_cell"]
+__all__ = ["STATION", "WORLD", "ImportedFrames", "ImportedModule", "KnownCell", "ReadImport", "known_cell"]

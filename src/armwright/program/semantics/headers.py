@@ -3,18 +3,23 @@
 import math
 from collections.abc import Mapping
 
-from armwright.errors import ArmwrightError
+import attrs
+
+from armwright.errors import ArmwrightError, closest
 from armwright.program.language.diagnostic import did_you_mean, labels
 from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.names import is_module
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
+from armwright.program.language.words import VOCABULARIES
 from armwright.program.semantics.arguments import Arguments, argument_values
 from armwright.program.semantics.builtins import FIRST_FUNCTIONS, WITH_NAME
-from armwright.program.semantics.cell_symbols import STATION, WORLD, ImportedFrames, ReadImport, is_module
+from armwright.program.semantics.cell_symbols import STATION, WORLD, ImportedFrames, ReadImport
 from armwright.program.semantics.expression_types import KIND_OF_TYPE, ExpressionType
 from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import FRAME, PREDECLARED, ProcedureSymbols, SymbolTable
 from armwright.program.semantics.type_check import infer_type
 from armwright.program.syntax import tree
+from armwright.program.syntax.token_stream import either
 
 # More elements than this are a slip, and would take the memory of the machine.
 MAX_ELEMENTS = 1_000_000
@@ -39,6 +44,10 @@ def declare(
     """
     _declare_units(names, program)
     for header in program.headers:
+        if isinstance(header, tree.Record):
+            # Those of programs have been laid out.
+            text = "only the file of a program has records"
+            names.report("E260", text, header.span, "no record here", advice="write a program in a file of its own")
         if isinstance(header, tree.Import):
             _declare_import(names, header, read_import)
     for declaration in program.declarations:
@@ -83,6 +92,13 @@ def _report_duplicate(names: NameResolver, name: tree.Name, first: tree.Name) ->
 
 def _declared_type(names: NameResolver, written: tree.TypeName) -> VariableType | None:
     """Return what a declaration declares; None where something was wrong with it."""
+    if written.record is not None:
+        # What is left of these when records have been laid out is none.
+        types = VOCABULARIES[names.symbols.std].types
+        near, text = closest(written.record.text, types), f"unknown type `{written.record.text}`"
+        label = f"expected {either(types)}"
+        names.report("E205", text, written.record.span, label, advice=did_you_mean(near))
+        written = attrs.evolve(written, key=near, record=None)
     sizes = [_array_size(names, number) for number in written.sizes]
     if written.key is None or None in sizes:
         return None

@@ -155,7 +155,9 @@ class NameResolver:
 
     def _report_unused_names(self, table: SymbolTable, exported: Collection[str] = ()) -> None:
         for key, name in table.declared.items():
-            if key not in table.used and key not in exported and table.types[key] is not None:
+            # Of a record single fields may be unused.
+            is_record = "." in key
+            if key not in table.used and key not in exported and not is_record and table.types[key] is not None:
                 self.report("L304", f"`{name.text}` is never used", name.span, "declared here")
 
     def _declaring_procedure(self, key: str) -> ProcedureSymbols | None:

@@ -7,7 +7,7 @@ from functools import partial
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import did_you_mean
-from armwright.program.language.words import HEADERS_IN_CONTEXT, PARAMETER_MODES, TYPES_IN_CONTEXT
+from armwright.program.language.words import HEADERS_IN_CONTEXT, PARAMETER_MODES, TYPES_IN_CONTEXT, Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import number, parenthesised_list
 from armwright.program.syntax.lexer import TokenKind
@@ -141,7 +141,7 @@ def _declared_name(tokens: TokenStream, names: list[tree.Name]) -> None:
 
 
 # type = [ "ARRAY" "[" number { "," number } "]" "OF" ] kind ;
-# kind = "SCALAR" | "TRANS" | "FRAME" | "EVENT" | "BOOLEAN" | "TEXT" ;
+# kind = "SCALAR" | "TRANS" | "FRAME" | "EVENT" | "BOOLEAN" | "TEXT" | name ;
 def type_name(tokens: TokenStream) -> tree.TypeName:
     """Read a type."""
     start = tokens.current
@@ -152,6 +152,11 @@ def type_name(tokens: TokenStream) -> tree.TypeName:
     if tokens.accept(*types) or tokens.accept_word(*TYPES_IN_CONTEXT):
         span = tokens.span_since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
+    if token.kind is TokenKind.NAME and tokens.standard is Standard.RLO_2:
+        # Of a record; which there are is known when all is read.
+        record = tokens.take_name()
+        span = tokens.span_since(start)
+        return tree.TypeName(span, tokens.source.slice(span), None, sizes, record)
     if token.kind is not TokenKind.NAME:
         tokens.fail(f"expected a type after `{'OF' if sizes else ':'}`", expected)
     near = closest(token.text, types)

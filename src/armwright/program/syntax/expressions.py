@@ -176,8 +176,19 @@ def _arm(tokens: TokenStream) -> tree.ArmName:
 def _index(tokens: TokenStream, name: tree.Name) -> tree.Index | tree.Poison:
     indices = expression_list(tokens, "an index", f"after {name.text}", "[")
     tokens.height += 1
+    name = _field(tokens, name)
     span = tokens.span_since(name.span)
     return tree.Index(span, name, indices) if indices else tree.Poison(span, frozenset((name.key,)))
+
+
+def _field(tokens: TokenStream, name: tree.Name) -> tree.Name:
+    """Read the field of an element of an array, if one follows: ``parts[2].weight`` is the element of that field."""
+    has_field = tokens.current.key == "." and tokens.peek().kind is _NAME
+    if not has_field or tokens.standard is not Standard.RLO_2:
+        return name
+    tokens.take()
+    read = tokens.take_name()
+    return tree.Name(name.span, f"{name.text}.{read.text}", f"{name.key}.{read.key}")
 
 
 def _parenthesised(tokens: TokenStream) -> tree.Expression:
@@ -199,7 +210,7 @@ def mobile(tokens: TokenStream, wants: str, where: str) -> tree.Mobile:
     return _arm(tokens) if tokens.current.kind is _ARM else _lvalue(tokens, wants, where)
 
 
-# lvalue = name [ "[" expr { "," expr } "]" ] ;
+# lvalue = name [ "[" expr { "," expr } "]" [ "." name ] ] ;
 def _lvalue(tokens: TokenStream, wants: str, where: str) -> tree.Variable:
     if tokens.current.kind is not _NAME:
         tokens.note_expected_operand(wants, where)

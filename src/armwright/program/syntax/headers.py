@@ -160,6 +160,25 @@ def _import(tokens: TokenStream) -> list[tree.Header]:
     return [node]
 
 
+# record = "RECORD" name ";" decl { decl } "END" ";" ;
+def _record(tokens: TokenStream) -> list[tree.Header]:
+    start = tokens.current
+    tokens.accept_word("RECORD")
+    if tokens.current.kind is TokenKind.KEYWORD:
+        tokens.report_reserved_name()
+    name = tokens.take_name()
+    tokens.check_name_length(name)
+    tokens.accept_semicolon("after the name of the record")
+    fields = declarations(tokens)
+    if not fields:
+        tokens.report_once("E111", "a record has no fields", tokens.gap_span(), "expected `name : TYPE ;` here")
+    if not tokens.accept("END"):
+        tokens.report_once("E115", "the record has no END", tokens.gap_span(), "expected `END ;` here")
+    node = tokens.node(tree.Record, start, name, tuple(fields))
+    tokens.accept_semicolon("after the record")
+    return [node]
+
+
 # units = "UNITS" unitname { "," unitname } ";" ;
 def _units(tokens: TokenStream) -> list[tree.Header]:
     start = tokens.take()
@@ -345,6 +364,7 @@ def late_header(tokens: TokenStream) -> tree.Statement:
 _HEADERS: Mapping[str, Callable[[TokenStream], Sequence[tree.Header]]] = {
     "VAR": var_part,
     "MODULE": _module,
+    "RECORD": _record,
     "CONST": _constants,
     "FUNCTION": _procedure,
     "IMPORT": _import,

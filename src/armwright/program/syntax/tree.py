@@ -253,6 +253,11 @@ class Block(Node):
     statements: tuple["Statement", ...]
     end: Span
 
+    @property
+    def is_assignment(self) -> bool:
+        """Whether it stands for the assignment of a record, field by field, which is one statement."""
+        return self.end == self.span
+
 
 @attrs.frozen
 class If(Node):
@@ -502,11 +507,13 @@ class TypeName(Node):
         text: as written.
         key: such as SCALAR; None when it is none of the types.
         sizes: of an array, one for each index; empty for a single thing.
+        record: the name of a RECORD, where the type is one; its key is None then.
     """
 
     text: str
     key: str | None
     sizes: tuple[Number, ...] = ()
+    record: Name | None = None
 
 
 @attrs.frozen
@@ -516,6 +523,14 @@ class Declaration(Node):
     names: tuple[Name, ...]
     type: TypeName
     mode: str = ""
+
+
+@attrs.frozen
+class Record(Node):
+    """``RECORD name ; fields END``: a type whose variables have fields of their own."""
+
+    name: Name
+    fields: tuple[Declaration, ...]
 
 
 @attrs.frozen
@@ -563,7 +578,7 @@ class Procedure(Node):
     result: TypeName | None = None
 
 
-Header: TypeAlias = Module | Declaration | Constant | Import | Units | Procedure
+Header: TypeAlias = Module | Record | Declaration | Constant | Import | Units | Procedure
 
 
 @attrs.frozen
@@ -590,6 +605,11 @@ class Program(Node):
     def imports(self) -> tuple[Import, ...]:
         """The imports."""
         return tuple(header for header in self.headers if isinstance(header, Import))
+
+    @property
+    def records(self) -> tuple[Record, ...]:
+        """The types of records."""
+        return tuple(header for header in self.headers if isinstance(header, Record))
 
     @property
     def declarations(self) -> tuple[Declaration, ...]:
