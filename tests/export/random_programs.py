@@ -7,7 +7,7 @@ HEAD = """UNITS MM ;
 CONST lift = XYZ(0, 0, -60) ; half = 0.5 ;
 VAR a, b, c, d, part, home : FRAME ; aside : TRANS ;
     grid : ARRAY [2,2] OF FRAME ;
-    n, m, i, j : SCALAR ; flag : BOOLEAN ;
+    n, m, i, j, k : SCALAR ; flag : BOOLEAN ;
 
 FUNCTION beside(f : FRAME, k : SCALAR) : FRAME ;
 BEGIN
@@ -131,5 +131,5 @@ class Writer:
                 variable = "i" if depth > 1 else "j"
                 return f"FOR {variable} = {head} DO {self.inner(depth)}"
             case "while":
-                return f"BEGIN m = 1 ; WHILE m < 3 DO BEGIN {self.statement(0)} ; m = m + 1 END END"
-        return f"BEGIN m = 2 ; REPEAT {self.statement(0)} ; m = m - 1 UNTIL m < 1 END"
+                return f"BEGIN k = 1 ; WHILE k < 3 DO BEGIN {self.statement(0)} ; k = k + 1 END END"
+        return f"BEGIN k = 2 ; REPEAT {self.statement(0)} ; k = k - 1 UNTIL k < 1 END"
