@@ -37,7 +37,9 @@ ARMS = {
 def mapped_arm(target: str) -> ControllerArm:
     """Return the arm of the cell of a target, with the convention of its controller."""
     name, convention = ARMS[target]
-    arm = load_arm(name if name == "ur5" else str(HERE / "arms" / f"{name}.toml"))
+    arm = load_arm(
+        name if name == "ur5" else str((HERE / "arms" if name == "lrmate200id" else EXAMPLES) / f"{name}.toml")
+    )
     return controller_arm(arm, conventions()[convention])
 
 

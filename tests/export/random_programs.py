@@ -5,9 +5,9 @@ import numpy as np
 FRAMES = ("a", "b", "c", "d")
 HEAD = """UNITS MM ;
 CONST lift = XYZ(0, 0, -60) ; half = 0.5 ;
-VAR a, b, c, d, part, home : FRAME ; step : TRANS ;
+VAR a, b, c, d, part, home : FRAME ; aside : TRANS ;
     grid : ARRAY [2,2] OF FRAME ;
-    n, m, i, j : SCALAR ; flag : BOOLEAN ;
+    n, m, i, j, k : SCALAR ; flag : BOOLEAN ;
 
 FUNCTION beside(f : FRAME, k : SCALAR) : FRAME ;
 BEGIN
@@ -38,7 +38,7 @@ BEGIN
 END ;
 
 BEGIN
-  home = ARM_1 ; n = 1 ; m = 2 ; flag = FALSE ; step = XYZ(10, 0, 5) ;
+  home = ARM_1 ; n = 1 ; m = 2 ; flag = FALSE ; aside = XYZ(10, 0, 5) ;
 """
 
 
@@ -73,7 +73,7 @@ class Writer:
         index = self.pick("1", "2")
         return self.pick(
             self.pick(*FRAMES),
-            f"{self.pick(*FRAMES)} * step",
+            f"{self.pick(*FRAMES)} * aside",
             f"grid[{index},{self.pick('1', '2', 'm')}]",
             f"beside({self.pick(*FRAMES)}, n)",
             f"{self.pick(*FRAMES)} * ROTZ({self.number(-10, 10)})",
@@ -95,7 +95,7 @@ class Writer:
         """A block in a statement."""
         return "BEGIN " + " ".join(self.block(int(self.rng.integers(1, 4)), depth - 1)) + " END"
 
-    def statement(self, depth: int) -> str:
+    def statement(self, depth: int) -> str:  # noqa: C901, PLR0911 - one case per kind
         """A statement."""
         kinds = ["move", "move", "move", "via", "place", "affix", "number", "output", "print", "wait", "call"]
         kinds += ["if", "for", "while", "repeat"] if depth else []
@@ -109,7 +109,7 @@ class Writer:
             case "via":
                 return f"MOVE ARM_1 TO {g} VIA ({f} * lift, {g} * lift){self.pick('', ', WITH BLEND = 10')}"
             case "place":
-                return f"{f} = {self.pick(f'{g} * XYZ(0, 0, 5)', f'{f} * ROTZ(5)', f'home * INV(home) * {f}')}"
+                return f"{f} = {self.pick(f'{g} * XYZ(0, 0, 5)', f'{f} * ROTZ(5)', f'home * (INV(home) * {f})')}"
             case "affix":
                 return self.pick(f"AFFIX {max(f, g)} TO {min(f, g)}", f"UNFIX {f}", "carry(part, a)")
             case "number":
@@ -131,5 +131,5 @@ class Writer:
                 variable = "i" if depth > 1 else "j"
                 return f"FOR {variable} = {head} DO {self.inner(depth)}"
             case "while":
-                return f"BEGIN m = 1 ; WHILE m < 3 DO BEGIN {self.statement(0)} ; m = m + 1 END END"
-        return f"BEGIN m = 2 ; REPEAT {self.statement(0)} ; m = m - 1 UNTIL m < 1 END"
+                return f"BEGIN k = 1 ; WHILE k < 3 DO BEGIN {self.statement(0)} ; k = k + 1 END END"
+        return f"BEGIN k = 2 ; REPEAT {self.statement(0)} ; k = k - 1 UNTIL k < 1 END"

@@ -85,7 +85,7 @@ END.
 def cell_text(name: str) -> str:
     """A cell of the tests with a second arm, a device without an output, and an answer of the camera."""
     text = CELLS[name].read_text(encoding="utf-8")
-    text = re.sub(r'model = "(\w+)\.toml"', lambda found: f'model = "{CELLS[name].parent}/{found[1]}.toml"', text)
+    text = re.sub(r'model = "([\w./]+)\.toml"', lambda found: f'model = "{CELLS[name].parent}/{found[1]}.toml"', text)
     model = re.search(r"model = .*", text)
     convention = re.search(r"controller = .*", text)
     assert model is not None

@@ -20,13 +20,13 @@ from armwright.export.translation.translate import translate_program
 from armwright.export.writers import krl_program
 from armwright.program import Compilation, Recording, RunError, Source, compile as compile_program, run
 from armwright.program.syntax import tree
-from export.cases import EXAMPLES, HERE
+from export.cases import EXAMPLES
 from export.random_programs import Writer
 
 CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",
-    "krl": HERE / "arms" / "kr6r900_bent_cell.toml",
-    "rapid": HERE / "arms" / "irb120_bent_cell.toml",
+    "krl": EXAMPLES / "kr6_cell.toml",
+    "rapid": EXAMPLES / "irb120_cell.toml",
 }
 MACHINES = {"urscript": urscript_machine, "krl": krl_machine, "rapid": rapid_machine}
 STATEMENTS = "statements that differ in kind, text or order"
@@ -75,7 +75,7 @@ def test_both_branches_of_an_if_are_seen(target: str) -> None:
     """Small and large parts come by the timeline of the cell; a machine that reads another input does otherwise."""
     file = main_text(target, "sort")
     small, large = file.count("small_tray"), file.count("large_tray")
-    compiled, recording = ran(target, "sort")
+    _, recording = ran(target, "sort")
     said = [effect.data["printed"] for effect in recording.effects if effect.kind == "PRINT"]
 
     assert (small > 1, large > 1) == (True, True)
@@ -107,10 +107,25 @@ def failures(target: str, name: str, text: str) -> list[str]:
 
 
 FAULTS = {
-    "urscript": [("< 4.5", "< 3.5"), ("p[0.43,", "p[0.43002,"), ("if get_standard_digital_in(2):", "if not get_standard_digital_in(2):"), ("_out(0, True)", "_out(0, False)")],
-    "krl": [("TO 4", "TO 3"), ("X 430,", "X 430.02,"), ("IF $IN[2] THEN", "IF NOT $IN[2] THEN"), ("$OUT[1]=TRUE", "$OUT[1]=FALSE")],
-    "rapid": [("TO 4", "TO 3"), ("[[430,", "[[430.02,"), ("IF (DInput(diLarge)", "IF NOT (DInput(diLarge)"), ("SetDO doGrip,1", "SetDO doGrip,0")],
-}  # fmt: skip
+    "urscript": [
+        ("< 4.5", "< 3.5"),
+        ("p[0.43,", "p[0.43002,"),
+        ("if get_standard_digital_in(2):", "if not get_standard_digital_in(2):"),
+        ("_out(0, True)", "_out(0, False)"),
+    ],
+    "krl": [
+        ("TO 4", "TO 3"),
+        ("X 430,", "X 430.02,"),
+        ("IF $IN[2] THEN", "IF NOT $IN[2] THEN"),
+        ("$OUT[1]=TRUE", "$OUT[1]=FALSE"),
+    ],
+    "rapid": [
+        ("TO 4", "TO 3"),
+        ("[[430,", "[[430.02,"),
+        ("IF (DInput(diLarge)", "IF NOT (DInput(diLarge)"),
+        ("SetDO doGrip,1", "SetDO doGrip,0"),
+    ],
+}
 
 
 @pytest.mark.parametrize("target", CELLS)
@@ -170,15 +185,16 @@ def test_what_has_no_translator_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     """A statement of a later language is refused by its first words, because the table does not have it."""
     known = {kind: one for kind, one in translate.TRANSLATORS.items() if kind is not tree.Pause}
     monkeypatch.setattr(translate, "TRANSLATORS", known)
-    with pytest.raises(ExportError, match="E619: `PAUSE 0.1` has no counterpart"):
+    with pytest.raises(ExportError, match=r"E619: `PAUSE 0\.1` has no counterpart"):
         export_program("krl", Source("test.rlo", "BEGIN PAUSE 0.1 END."), CELLS["krl"], mode="program")
 
 
 @pytest.mark.parametrize("target", CELLS)
 def test_frames_that_hang_here_or_there(target: str) -> None:
     """Where a frame hangs on the arm in one branch alone, its next use is refused; without a use it is not."""
-    text = "VAR f : FRAME ; n : SCALAR ; BEGIN n = 1 ; f = ARM_1 ;\nIF n > 0 THEN AFFIX f TO ARM_1 ;\n{use}MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.02) END."
-    with pytest.raises(ExportError, match="test.rlo:3: E620") as caught:
+    head = "VAR f : FRAME ; n : SCALAR ; BEGIN n = 1 ; f = ARM_1 ;\nIF n > 0 THEN AFFIX f TO ARM_1 ;\n"
+    text = head + "{use}MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.02) END."
+    with pytest.raises(ExportError, match=r"test\.rlo:3: E620") as caught:
         export_program(target, Source("test.rlo", text.format(use="PRINT(X(f)) ;")), CELLS[target], mode="program")
     assert "hangs depends on the way" in str(caught.value)
     assert exported(target, text.format(use="")).proof.mode == "program"
@@ -216,10 +232,10 @@ MEANINGS = {
     "what is carried moves with the arm": (
         "MOVE ARM_1 TO a ; AFFIX b TO ARM_1 ; AFFIX c TO b AT XYZ(0, 10, 0) ; MOVE b TO a ; UNFIX b ; MOVE ARM_1 TO c"
     ),
-    "a loop keeps its bounds": "m = 3 ; FOR n = 1 TO m DO BEGIN m = 1 ; MOVE ARM_1 TO a * XYZ(0, 5*n, 0) END ; PRINT(n)",
+    "a loop keeps its bounds": "m = 3 ; FOR n = 1 TO m DO BEGIN m = 1 ; MOVE ARM_1 TO a * XYZ(0, n, 0) END ; PRINT(n)",
     "a loop without a pass": "FOR n = 3 TO 1 DO PRINT(n) ; FOR n = 3 TO 1 STEP -1 DO PRINT(n) ; PRINT(n)",
     "halves": "FOR n = 0 TO 1 STEP 0.25 DO PRINT(n / 2) ; n = 7 ; m = 2 ; PRINT(n / m, (n - 1) / (m + 2))",
-    "a HALT ends all": "n = 1 ; REPEAT n = n + 1 ; IF n > 2 THEN BEGIN OPERATE lamp ON ; HALT END UNTIL n > 5 ; PRINT(n)",
+    "a HALT ends all": "REPEAT n = n + 1 ; IF n > 2 THEN BEGIN OPERATE lamp ON ; HALT END UNTIL n > 5 ; PRINT(n)",
     "angles": "MOVE ARM_1 TO a * ROTZ(n + 20) * RPY(0, 5*n, 0) ; PRINT(SIN(30*n), SQRT(ABS(-4*n)), ATAN2(n, n))",
     "a duration": "MOVE ARM_1 TO a WITH DURATION = 3 ; MOVE ARM_1 TO a WITH DURATION = 1 ; MOVE ARM_1 TO a",
 }
@@ -229,19 +245,15 @@ MEANINGS = {
 @pytest.mark.parametrize("target", CELLS)
 def test_meanings(target: str, meaning: str) -> None:
     """The statements mean on the controller what they mean in RLO."""
-    text = f"""UNITS MM ; VAR a, b, c : FRAME ; n, m : SCALAR ;
-    BEGIN n = 1 ; a = WORLD * XYZ(400, 20, 120) * RPY(180, 0, 10) ; b = a * XYZ(0, 0, -30) ; {meaning_text(meaning)} END."""
+    head = "UNITS MM ; VAR a, b, c : FRAME ; n, m : SCALAR ; BEGIN n = 1 ; "
+    frames = "a = WORLD * XYZ(400, 20, 120) * RPY(180, 0, 10) ; b = a * XYZ(0, 0, -30) ; "
+    text = f"{head}{frames}{MEANINGS[meaning]} END."
 
     assert {one.quantity: one.worst for one in exported(target, text).proof.comparisons}[STATEMENTS] == 0
 
 
-def meaning_text(meaning: str) -> str:
-    """The statements of a meaning."""
-    return MEANINGS[meaning]
-
-
 @pytest.mark.share(0.05)
-def test_inverses_of_krl(sample) -> None:  # noqa: ANN001 - a fixture
+def test_inverses_of_krl(sample) -> None:
     """The inverse of a frame that is computed in KRL is that of linear algebra, at quarter turns of B too."""
     helper = krl_program.HELPERS["INVERSE_OF"].format(name="inverse_of")
     for rng in sample.cases(400):
@@ -258,15 +270,13 @@ def test_inverses_of_krl(sample) -> None:  # noqa: ANN001 - a fixture
 
 @pytest.mark.share(0.02)
 @pytest.mark.parametrize("target", CELLS)
-def test_random_programs(target: str, sample) -> None:  # noqa: ANN001 - a fixture
+def test_random_programs(target: str, sample) -> None:
     """Random programs that run in the cell go out with their proof, or are refused with a reason."""
     proved = refused = failed = 0
     for rng in sample.cases(400):
         text = Writer(rng).text()
         compiled = compile_program(Source("random.rlo", text), CELLS[target])
-        if compiled.code is None:
-            failed += 1
-            continue
+        assert compiled.code is not None, f"{compiled.diagnostics}\n{text}"
         try:
             recording = run(compiled)
         except RunError:
@@ -276,9 +286,11 @@ def test_random_programs(target: str, sample) -> None:  # noqa: ANN001 - a fixtu
             export_compiled(target, compiled, recording, "random")
             proved += 1
         except ExportError as error:
-            assert error.diagnostic.code in HOSTILE, f"{error}\n{text}"
+            if error.diagnostic.code not in HOSTILE:
+                raise AssertionError(f"{error}\n{text}") from error
             refused += 1
         except CheckFailedError as error:
             raise AssertionError(f"{error}\n{text}") from error
     sample.record(f"random programs in {target}", proved, 0, refused=refused, not_run=failed)
-    assert proved or sample.count(400) < 20
+    assert proved + failed > refused
+    assert proved

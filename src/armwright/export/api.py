@@ -13,8 +13,8 @@ from armwright.errors import CheckFailedError, InvalidValueError, one_of
 from armwright.export.checkers import (
     fanuc as fanuc_checker,
     krl as krl_checker,
-    rapid as rapid_checker,
     krl_machine,
+    rapid as rapid_checker,
     rapid_machine,
     urscript as urscript_checker,
     urscript_machine,

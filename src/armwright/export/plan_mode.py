@@ -25,7 +25,7 @@ from armwright.export.statements import (
     Wait,
 )
 from armwright.motion.solver import Solver, solver_of
-from armwright.program.bytecode.instructions import Op
+from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.source import Span
 from armwright.program.vm.recording import Effect, Recording, RunStage
 from armwright.spatial.rotations import angle_between
@@ -194,9 +194,9 @@ def mapped_arm(recording: Recording, arm_name: str) -> ControllerArm:
     if convention is None:
         text = f"no source that was read says how the controller of '{placed.arm.name}' counts its joints"
         fitting = _fitting(placed.arm)
+        known = ", ".join(sorted(conventions()))
         helps = [
-            f'name the convention in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; '
-            f"known: {', '.join(sorted(conventions()))}",
+            f'name one in the cell file, as in `[arms.{arm_name}]` `controller = "kuka"`; known: {known}',
             f"the axes of this arm can stand as those of: {', '.join(fitting) or 'none of them'}",
         ]
         raise refusal(source, "E614", text, span, f"{arm_name} moves here", helps=helps)
@@ -223,15 +223,31 @@ def run_events(recording: Recording) -> Iterator[_Event]:
     """Give what happened, in order: begin, end, effect, and the stages of a MOVE."""
     stages = {name: iter([stage for stage in recording.stages if stage.arm == name]) for name in recording.cell.arms}
     following = {name: next(ones, None) for name, ones in stages.items()}
+    counts = _stage_counts(recording.code)
     for effect in recording.effects:
         if effect.kind in _SILENT:
             continue
         mine: list[RunStage] = []
         if effect.kind == "MOVE" and effect.arm is not None:
-            while (stage := following[effect.arm]) is not None and _belongs(stage, effect):
+            count = counts.get(effect.span, 1)
+            while len(mine) < count and (stage := following[effect.arm]) is not None and _belongs(stage, effect):
                 mine.append(stage)
                 following[effect.arm] = next(stages[effect.arm], None)
         yield effect.t0, effect.t1, effect, tuple(mine)
+
+
+def _stage_counts(code: Code) -> dict[Span, int]:
+    """Return how many stages each MOVE has: the same MOVE may begin again when it has just ended."""
+    counts: dict[Span, int] = {}
+    count = 0
+    for step in code.instructions:
+        if step.op is Op.MVBEG:
+            count = 1
+        elif step.op in (Op.MVAPP, Op.MVDEP):
+            count += 1
+        elif step.op is Op.MVEND:
+            counts[step.span] = count
+    return counts
 
 
 def _belongs(stage: RunStage, effect: Effect) -> bool:

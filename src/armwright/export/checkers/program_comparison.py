@@ -21,7 +21,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import allowed_configurations
 from armwright.motion.plan import StageGoal
 
-# Of stages that have a time: that of the passages of one stage may differ by so much [s].
+# By so much the passages of one stage may differ in time, and waits that are worked out [s].
 _SAME_TIME = 2e-3
 # Numbers in texts may differ by this part.
 _DIGITS = 1e-4
@@ -94,9 +94,8 @@ class _ComparingRun(Comparing):
         return asked and all(words[word] & here[word] for word in action.kept)
 
     def _duration(self, found: float, planned: float, action: JointAction | LineAction | WaitAction) -> None:
-        if isinstance(action, WaitAction):
-            super()._duration(found, planned, action)
-        elif planned:
+        # A run waits for a whole number of servo periods.
+        if isinstance(action, WaitAction) or planned:
             self.times.add(max(abs(found - planned) - action.rounding - _SAME_TIME, 0.0), action.line)
 
     def _configuration(self, action: LineAction) -> None:

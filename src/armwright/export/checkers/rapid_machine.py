@@ -326,7 +326,7 @@ class _Machine(Machine):
                 return float(held["xyz".index(axis), 3]) * 1e3
         raise CheckError(f"line {line}: the machine does not know this part of {name}")
 
-    def _function(self, name: str, nodes: Sequence[Any], line: int) -> Any:  # noqa: PLR0911 - one case per kind
+    def _function(self, name: str, nodes: Sequence[Any], line: int) -> Any:  # noqa: C901, PLR0911 - one case per kind
         if name.lower() in self.routines:
             return self.routine(name, [self.value(one) for one in nodes], line)
         if name in ("DInput", "DOutput"):
@@ -381,7 +381,7 @@ def _pose(value: Any, line: int) -> Array:
     """Return a pose (4, 4) of a place in millimetres and a quaternion, or of an orientation that was computed."""
     if isinstance(value, np.ndarray):
         return value
-    if len(value) != 2 or len(value[0]) != 3:  # noqa: PLR2004 - a place and an orientation
+    if len(value) != 2 or len(value[0]) != 3:
         raise CheckError(f"line {line}: expected a place and an orientation")
     rotation = value[1]
     if not isinstance(rotation, np.ndarray):

@@ -381,7 +381,8 @@ class _Writer:
             yield f"{motion} {{{short_frame(target.X)},S {status}{fields}}}{way}"
             return
         place = self._variable("TARGET", "POS")
-        yield f"{place}={self._values.call(self._values.helper('POSTURE'), [self._values.text(target), str(status), str(turn)])}"
+        arguments = [self._values.text(target), str(status), str(turn)]
+        yield f"{place}={self._values.call(self._values.helper('POSTURE'), arguments)}"
         yield f"{motion} {place}{way}"
 
 

@@ -49,7 +49,9 @@ def write(program: ControllerProgram) -> ControllerFile:
         lines += [f"  {line}" for line in _lines(statement, program)]
         if len(lines) > MOST_LINES:
             text = f"the program takes more than {MOST_LINES:,} lines of URScript, which controllers do not bear"
-            helps = ["export parts of the program one by one, or by `armwright export ros2`"]
+            helps = [
+                "export the program by `--mode program`, in which loops stay loops and paths are a line for each frame"
+            ]
             raise refusal(program.source, "E617", text, statement.span, "too many lines from here on", helps=helps)
     lines += ["end", f"{name}()"]
     return ControllerFile(
