@@ -33,7 +33,7 @@ from armwright.spatial.rotations import rotation_vector
 Complex: TypeAlias = NDArray[np.complex128]
 
 # Configurations at random whose paths to the first pose begin to find all that it has, and as many near singular ones,
-# down to the fifth power of ten: with a wrist that is nearly spherical, some are far from all others [rad].
+# between 0.1 and this power of ten off: with a wrist that is nearly spherical some solutions are far from all others.
 _SEEDS, _NEAREST = 48, 5.0
 # Loops that bring nothing new before the configurations are said to be all, and loops at most.
 _IDLE_LOOPS, _LOOPS = 6, 60
