@@ -155,8 +155,8 @@ def test_listing_of_names_and_numbers() -> None:
 
 
 def test_trajectories() -> None:
-    """There are the three basic trajectories of the report, and one with rounded corners."""
-    assert [kind.value for kind in MotionKind] == ["PTP", "LINE", "SPLINE", "BLEND"]
+    """There are the three basic trajectories of the report, one with rounded corners, and arcs."""
+    assert [kind.value for kind in MotionKind] == ["PTP", "LINE", "SPLINE", "BLEND", "ARC"]
 
 
 @pytest.mark.parametrize(

@@ -219,8 +219,8 @@ class MotionKind(enum.StrEnum):
     PTP = "PTP"
     LINE = "LINE"
     SPLINE = "SPLINE"
-    ARC = "ARC"
     BLEND = "BLEND"
+    ARC = "ARC"
 
 
 @attrs.frozen(kw_only=True)
