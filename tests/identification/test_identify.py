@@ -244,3 +244,60 @@ def test_held_out_part_is_a_quarter(good: Log, how: str) -> None:
     assert len(times[1]) / len(good.t) == pytest.approx(0.25, abs=0.02)
     assert not np.intersect1d(*times).size
     assert len(times[0]) + len(times[1]) == len(good.t)
+
+
+def test_single_wild_readings_do_no_harm(truth_arm: Arm, good: Log, rng: np.random.Generator) -> None:
+    """Spikes of positions and efforts are told, and what is identified is what is identified without them."""
+    q, effort = good.q.copy(), good.effort.copy()
+    rows, joints = rng.choice(np.arange(100, len(q) - 100, 20), 30, replace=False), rng.integers(0, 6, 30)
+    q[rows[:10], joints[:10]] += 0.5
+    effort[rows[10:], joints[10:]] += 300.0
+
+    found = identify(truth_arm, [_changed(good, q=q, effort=effort)], laws=LAWS[2:3])
+    plain = identify(truth_arm, [good], laws=LAWS[2:3])
+
+    told = [warning for warning in found.warnings if "stand far out from their neighbours" in warning]
+    assert [each.split(": ")[1].split(" stand")[0] for each in told] == [
+        "10 readings of positions",
+        "20 readings of efforts",
+    ]
+    assert np.abs(found.fit.values - plain.fit.values).max() < 2 * plain.fit.errors.max()
+    assert found.preparation.delay == pytest.approx(plain.preparation.delay, abs=5e-4)
+
+
+def test_steps_at_gaps_are_no_spikes(good: Log) -> None:
+    """What differs on both sides of a gap stays as it was read."""
+    kept = np.ones(len(good.t), dtype=bool)
+    kept[1000:1500] = False
+    cut = Log(name="log.csv", t=good.t[kept], q=good.q[kept], effort=good.effort[kept])
+    np.testing.assert_array_equal(cut.without_spikes().q, cut.q)
+
+
+@pytest.mark.parametrize("late", [-0.16, 0.12])
+def test_long_delays_are_found(truth_arm: Arm, good: Log, late: float) -> None:
+    """Efforts that come a tenth of a second before or after the positions are brought together with them."""
+    shift = round(late / good.period)
+    rows = slice(max(shift, 0), len(good.t) + min(shift, 0))
+    efforts = slice(max(-shift, 0), len(good.t) + min(-shift, 0))
+    moved = Log(name="log.csv", t=good.t[: len(good.q[rows])], q=good.q[rows], effort=good.effort[efforts])
+    before = identify(truth_arm, [good], laws=LAWS[2:3]).preparation.delay
+    assert identify(truth_arm, [moved], laws=LAWS[2:3]).preparation.delay == pytest.approx(before - late, abs=2e-3)
+
+
+def test_joint_that_counts_the_other_way_is_named(truth_arm: Arm, good: Log) -> None:
+    """A reversed effort of a joint that gravity loads does not make its link heavy: it is refused."""
+    with pytest.raises(ContradictionError, match="the efforts of joint 2 look reversed"):
+        identify(truth_arm, [_changed(good, effort=good.effort * [1, -1, 1, 1, 1, 1])])
+
+
+def test_efforts_that_tell_nothing_are_said(truth_arm: Arm, good: Log, rng: np.random.Generator) -> None:
+    """Noise, a joint without efforts, times in milliseconds, and efforts that never change are told apart."""
+    noisy = identify(truth_arm, [_changed(good, effort=rng.normal(size=good.effort.shape))], laws=LAWS[:1])
+    assert any("explains hardly anything of the efforts of joints 1, 2, 3" in warning for warning in noisy.warnings)
+    silent = identify(truth_arm, [_changed(good, effort=good.effort * [1, 1, 1, 1, 1, 0])], laws=LAWS[:1])
+    assert any("the effort of joint 6 never changes while it moves" in warning for warning in silent.warnings)
+    json.dumps(silent.as_data(), allow_nan=False)
+    slow = identify(truth_arm, [Log(name="log.csv", t=1000 * good.t, q=good.q, effort=good.effort)], laws=LAWS[:1])
+    assert any("are the times in seconds" in warning for warning in slow.warnings)
+    with pytest.raises(InvalidValueError, match="no effort ever changes"):
+        identify(truth_arm, [_changed(good, effort=np.ones_like(good.effort))])

@@ -20,6 +20,7 @@ from armwright.arrays import Array, positive
 from armwright.dynamics.bodies import body_of
 from armwright.dynamics.regressors import OF_LINK
 from armwright.errors import ContradictionError
+from armwright.identification.checks import refuse_other_units
 from armwright.identification.equations import Equations, equations
 from armwright.identification.fitting import robust, summed, weighted
 from armwright.identification.log import Log
@@ -56,17 +57,19 @@ def drive_gains(
         mass_alone: whether only its mass is known, not its centre and inertia.
 
     Raises:
-        InvalidValueError: the load has no mass.
+        InvalidValueError: the load has no mass; a log is of another arm, or in other units.
+        FileFormatError: positions look like degrees.
         TooFewError: too little motion is left.
         ContradictionError: a gain comes out as nothing.
     """
     positive(load.mass, "mass of the load", "kg")
+    refuse_other_units(model.arm, [*unloaded, *loaded])
     n = model.arm.n
     body = body_of(load)
     known = np.array([body.mass, *body.moment, *(body.tensor[a][b] for a, b in _PAIRS)])
     unknown = list(range(1, OF_LINK)) if mass_alone else []
     known[unknown] = 0.0
-    logs = [log.moving() for log in (*unloaded, *loaded)]
+    logs = [log.without_spikes().moving() for log in (*unloaded, *loaded)]
     preparation = preparation_of(logs)
     blocks: list[tuple[Equations, Array]] = []
     for log, carries in zip(logs, [False] * len(unloaded) + [True] * len(loaded), strict=True):

@@ -11,6 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import MissingExtraError, TooFewError
 from armwright.identification.checks import (
+    badly_explained,
     effort_warnings,
     log_warnings,
     refuse_other_units,
@@ -81,6 +82,7 @@ def identify(
     if not logs:
         raise TooFewError("expected at least one log to identify with, got none")
     refuse_other_units(arm, [*logs, *check])
+    logs = [log.without_spikes() for log in logs]
     warnings = list(log_warnings(arm, logs))
     logs = [log.moving() for log in logs]
     report("choosing the filter")
@@ -120,6 +122,8 @@ def identify(
     def predictions(of: Sequence[Log], values: Array) -> tuple[Prediction, ...]:
         return tuple(predict(model, values, motion, preparation, held) for motion in motions(of, preparation))
 
+    training = tuple(predict(model, fit.values, motion, preparation, held) for motion in all_motions)
+    warnings += badly_explained(arm, training)
     return Identification(
         model=model,
         law=law.name,
@@ -130,7 +134,7 @@ def identify(
         choices=tuple(choices),
         validation=predictions(check, fit.values),
         validation_of_arm=predictions(check, standard.base) if standard else (),
-        training=tuple(predict(model, fit.values, motion, preparation, held) for motion in all_motions),
+        training=training,
         delay_error=delay_error,
         speeds=speeds,
         weak=tuple(weak_parameters(model, fit)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import attrs
 import numpy as np
@@ -20,6 +20,9 @@ LEAST_SAMPLES = 50
 LEAST_MOTION = 1e-3
 # Positions move if they change faster than this part of nearly the fastest.
 _MOVES = 0.05
+# A spike is farther from the median of so many readings than nearly all others are, by this factor; and by this part of
+# the range.
+_NEIGHBOURS, _NEARLY_ALL, _SPIKE, _SPIKE_PART = 5, 0.99, 8.0, 1e-2
 # So many equal readings in a row at the largest magnitude of a joint are clipped.
 _CLIPPED = 4
 
@@ -39,6 +42,7 @@ class Log:
         effort: (k, n) efforts at the joints [N m] or [N]; or currents [A], where drive gains are sought.
         qd: (k, n) measured joint velocities; None where they were not measured.
         clipped: (k, n) whether a reading of the effort is at the end of its range.
+        spikes: (k, n) whether a reading of the effort stands far out from its neighbours.
         notes: what a reader must know of how it was read.
     """
 
@@ -49,6 +53,10 @@ class Log:
     qd: Array | None = attrs.field(default=None, converter=attrs.converters.optional(_array))
     clipped: Flags = attrs.field(
         default=attrs.Factory(lambda self: _clipped(self.effort), takes_self=True), converter=read_only
+    )
+    spikes: Flags = attrs.field(
+        default=attrs.Factory(lambda self: np.zeros(self.effort.shape, dtype=np.bool_), takes_self=True),
+        converter=read_only,
     )
     notes: tuple[str, ...] = ()
 
@@ -102,9 +110,14 @@ class Log:
 
     def take(self, rows: slice) -> Log:
         """Return a part of the log."""
-        qd = None if self.qd is None else self.qd[rows]
         return attrs.evolve(
-            self, t=self.t[rows], q=self.q[rows], effort=self.effort[rows], qd=qd, clipped=self.clipped[rows]
+            self,
+            t=self.t[rows],
+            q=self.q[rows],
+            effort=self.effort[rows],
+            qd=None if self.qd is None else self.qd[rows],
+            clipped=self.clipped[rows],
+            spikes=self.spikes[rows],
         )
 
     def moving(self) -> Log:
@@ -119,6 +132,34 @@ class Log:
         first, last = max(0, int(active[0]) - LEAST_SAMPLES // 2), int(active[-1]) + LEAST_SAMPLES // 2
         return self.take(slice(first, last)) if last - first >= LEAST_SAMPLES else self
 
+    def without_spikes(self) -> Log:
+        """Return the log without single readings that stand far out from their neighbours, and a note of them.
+
+        Positions are interpolated there, and efforts are left out.
+        """
+        ends = self._gap_ends
+        of_q, of_effort = _spikes(self.q, ends), _spikes(self.effort, ends)
+        if not of_q.any() and not of_effort.any():
+            return self
+        q = self.q.copy()
+        for joint in np.flatnonzero(of_q.any(axis=0)):
+            wrong = of_q[:, joint]
+            q[wrong, joint] = np.interp(self.t[wrong], self.t[~wrong], q[~wrong, joint])
+        notes = []
+        for what, spikes in (("position", of_q), ("effort", of_effort)):
+            if spikes.any():
+                row, joint = np.argwhere(spikes)[0].tolist()
+                notes.append(
+                    f"{self.name}: {counted(int(spikes.sum()), 'reading')} of {what}s stand far out from their "
+                    f"neighbours, and are left out; the first of joint {joint + 1} at {self.t[row]:.4g} s"
+                )
+        return attrs.evolve(self, q=q, spikes=of_effort, notes=(*self.notes, *notes))
+
+    @property
+    def _gap_ends(self) -> list[int]:
+        """The readings with which the log goes on after gaps."""
+        return (np.flatnonzero(np.diff(self.t) > _GAP * self.period) + 1).tolist()
+
     def gaps(self) -> list[tuple[float, float]]:
         """Return beginning and length of the gaps in the log [s]."""
         steps = np.diff(self.t)
@@ -126,7 +167,7 @@ class Log:
 
     def pieces(self) -> Iterator[Log]:
         """Give the parts between gaps that are long enough, each sampled evenly."""
-        ends = np.flatnonzero(np.diff(self.t) > _GAP * self.period) + 1
+        ends = self._gap_ends
         for first, last in zip([0, *ends], [*ends, len(self.t)], strict=True):
             if last - first >= LEAST_SAMPLES:
                 yield self.take(slice(int(first), int(last))).even()
@@ -143,8 +184,8 @@ class Log:
             return np.stack([np.interp(t, self.t, column) for column in values.T], axis=1)
 
         qd = None if self.qd is None else at(self.qd)
-        clipped = at(self.clipped.astype(np.float64)) > 0
-        return attrs.evolve(self, t=t, q=at(self.q), effort=at(self.effort), qd=qd, clipped=clipped)
+        clipped, spikes = (at(flags.astype(np.float64)) > 0 for flags in (self.clipped, self.spikes))
+        return attrs.evolve(self, t=t, q=at(self.q), effort=at(self.effort), qd=qd, clipped=clipped, spikes=spikes)
 
 
 def with_gains(log: Log, gains: ArrayLike) -> Log:
@@ -158,6 +199,16 @@ def with_gains(log: Log, gains: ArrayLike) -> Log:
         ShapeError: there are not n gains.
     """
     return attrs.evolve(log, effort=log.effort * exact_shape(gains, (log.n,), "gains", LARGEST))
+
+
+def _spikes(values: Array, gap_ends: Sequence[int]) -> Flags:
+    """Return which readings (k, n) stand far out from their neighbours on the same side of a gap."""
+    from scipy.ndimage import median_filter  # noqa: PLC0415 - takes a tenth of a second to load
+
+    medians = [median_filter(part, size=(_NEIGHBOURS, 1), mode="nearest") for part in np.split(values, gap_ends)]
+    apart = np.abs(values - np.concatenate(medians))
+    usual = np.quantile(apart, _NEARLY_ALL, axis=0)
+    return np.asarray(apart > _SPIKE * usual + _SPIKE_PART * np.ptp(values, axis=0))
 
 
 def _clipped(effort: Array) -> Flags:

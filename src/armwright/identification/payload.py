@@ -18,6 +18,7 @@ from armwright.dynamics.payloads import payload
 from armwright.dynamics.regressors import OF_LINK
 from armwright.errors import ContradictionError, UnsupportedArmError
 from armwright.files.result_table import ResultTable
+from armwright.identification.checks import log_warnings, refuse_other_units
 from armwright.identification.equations import equations
 from armwright.identification.feasible import Measured, ball, link_of, possible_bodies
 from armwright.identification.fitting import Fit, robust, summed
@@ -154,6 +155,8 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
         preparation: of motions; by the logs when left out.
 
     Raises:
+        InvalidValueError: a log is of another arm, or in other units.
+        FileFormatError: positions look like degrees.
         MissingExtraError: Clarabel is not installed.
         TooFewError: too little motion is left.
         UnsupportedArmError: no motion of the arm tells all of a load.
@@ -164,6 +167,9 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
     changes = tuple(f"{term}{i}" for i in range(1, n + 1) for term in _CHANGED)
     loaded = LoadedModel(model=model, of_arm=changes)
     _refuse_hidden(loaded)
+    refuse_other_units(arm, logs)
+    logs = [log.without_spikes() for log in logs]
+    notes = tuple(log_warnings(arm, logs))
     logs = [log.moving() for log in logs]
     preparation = preparation or preparation_of(logs)
     without = compile_arm(arm).inverse_dynamics
@@ -184,7 +190,8 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
         )
     body = Measured(combinations=np.eye(len(fit.values)), sums=summed(blocks, fit), sigma=fit.sigma)
     values, _ = possible_bodies(body, [ball(mass)], [], weight=_WEIGHT)
-    return Payload(arm=arm, load=link_of(values[:OF_LINK]), fit=fit, changes=values[OF_LINK:].reshape(n, len(_CHANGED)))
+    changed = values[OF_LINK:].reshape(n, len(_CHANGED))
+    return Payload(arm=arm, load=link_of(values[:OF_LINK]), fit=fit, changes=changed, notes=notes)
 
 
 def _refuse_hidden(loaded: LoadedModel) -> None:

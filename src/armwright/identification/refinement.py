@@ -70,7 +70,7 @@ class Refinement:
         for i, shape in enumerate(self._shapes):
             drawing[_TEN * i : _TEN * (i + 1)] = np.linalg.lstsq(shape.reshape(_TEN, 16).T, one, rcond=None)[0]
         for part in _TOWARDS:
-            x = (1 - part) * start + part * drawing
+            x: Array = (1 - part) * start + part * drawing
             if np.linalg.eigvalsh(self._inertias(x)).min() > _LAST_BARRIER:
                 break
         x[self._bounded] = np.maximum(x[self._bounded], _FIRST_BARRIER**2)

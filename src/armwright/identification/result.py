@@ -65,9 +65,9 @@ class Prediction:
 
     @property
     def relative(self) -> Array:
-        """(n,) the same by the root mean square of the efforts."""
+        """(n,) the same by the root mean square of the efforts; 1 where there are none."""
         size = np.sqrt((self.measured**2).mean(axis=0))
-        return np.asarray(self.rms / np.maximum(size, np.finfo(float).tiny))
+        return np.asarray(np.divide(self.rms, size, out=np.ones_like(size), where=size > 0))
 
     @property
     def correlation(self) -> Array:

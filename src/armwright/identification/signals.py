@@ -138,13 +138,16 @@ def _motion(log: Log, preparation: Preparation) -> Motion | None:
 
     rate = 1 / log.period
     border = max(2, int(np.ceil(preparation.border * rate)))
-    if len(log.t) < 2 * border + LEAST_SAMPLES:
+    # Positions are known as long as they were read, and no spline goes on beyond.
+    first = border + max(0, int(np.ceil(-preparation.delay * rate)))
+    last = len(log.t) - border - max(0, int(np.ceil(preparation.delay * rate)))
+    if last - first < LEAST_SAMPLES:
         return None
     # A quintic spline has all derivatives between readings, too, as a delay requires.
     t = log.t - preparation.delay
     q = make_interp_spline(t, low_pass(log.q, preparation.cutoff, rate), k=5)
     qd = q.derivative() if log.qd is None else make_interp_spline(t, low_pass(log.qd, preparation.cutoff, rate), k=5)
-    inside = slice(border, len(t) - border)
+    inside = slice(first, last)
     now = log.t[inside]
     velocity = qd(now)
     return Motion(
@@ -154,7 +157,7 @@ def _motion(log: Log, preparation: Preparation) -> Motion | None:
         qd=velocity,
         qdd=qd.derivative()(now),
         tau=log.effort[inside],
-        usable=(np.abs(velocity) > preparation.slow) & ~log.clipped[inside],
+        usable=(np.abs(velocity) > preparation.slow) & ~(log.clipped | log.spikes)[inside],
     )
 
 
