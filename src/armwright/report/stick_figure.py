@@ -29,8 +29,9 @@ def arm_record(
         base: (4, 4) pose of the arm in the world; the world itself when left out.
     """
     t, q, qd, qdd, tau = motion
-    all_states = *(limited_positions(arm, x) for x in (q, qd, qdd)), None if tau is None else limited_efforts(arm, tau)
-    at_limits = [attrs.evolve(span, joint=span.joint % arm.n) for span in limit_spans(arm.all_limits, (t, *all_states))]
+    known = None if tau is None else limited_efforts(arm, tau)
+    of_all = (t, limited_positions(arm, q), limited_positions(arm, qd), limited_positions(arm, qdd), known)
+    at_limits = [attrs.evolve(span, joint=span.joint % arm.n) for span in limit_spans(arm.all_limits, of_all)]
     rows = thinned_rows(len(t))
     t, q, qd, qdd, tau = t[rows], q[rows], qd[rows], qdd[rows], None if tau is None else tau[rows]
     joints = [
