@@ -95,7 +95,7 @@ def _sizes(model: DynamicModel, fit: Fit) -> Array:
     unknown = fit.errors > UNKNOWN * np.where(drawn > 0, drawn, np.abs(fit.values))
     # A value of which nothing is known is no size.
     found = np.where(unknown, _of_other_joints(model, fit, unknown), np.abs(fit.values))
-    return np.maximum(np.maximum(drawn, found), np.finfo(float).tiny)
+    return np.asarray(np.maximum(np.maximum(drawn, found), np.finfo(float).tiny))
 
 
 def _of_other_joints(model: DynamicModel, fit: Fit, unknown: Flags) -> Array:
