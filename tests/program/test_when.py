@@ -407,7 +407,7 @@ def test_no_deadlock() -> None:
 
 def test_same_bits_again() -> None:
     """The same program has the same run, to the last bit, also with two arms that interrupt one another's waits."""
-    cell = attrs.evolve(cell_of("cell2"), wiring=signals_cell(GO=at(0.2, 0.3, 0.6)).wiring)
+    cell = attrs.evolve(cell_of("cell2"), inputs=signals_cell(GO=at(0.2, 0.3, 0.6)).inputs)
     text = """VAR f, g : FRAME ; n : SCALAR ; ready : EVENT ;
     BEGIN f = ARM_1 * XYZ(0,0,-0.05) ; g = ARM_2 * XYZ(0,0,-0.05) ; n = 0 ;
     COBEGIN

@@ -35,19 +35,6 @@ class Input:
     pulse: float | None = None
 
 
-@attrs.frozen(kw_only=True)
-class Wiring:
-    """What a cell has beside devices that are on or off.
-
-    Attributes:
-        inputs: by name, what programs read, and how that behaves in a simulated cell.
-        analogue_devices: names of the devices that can be set to any number.
-    """
-
-    inputs: Mapping[str, Input] = attrs.field(factory=dict)
-    analogue_devices: frozenset[str] = frozenset()
-
-
 def value_at(changes: Changes, time: float, start: float = 0.0) -> float:
     """Return the value behind the last change up to a time [s]; the one at the start where there is none."""
     return next((value for when, value in reversed(changes) if when <= time + _SAME_TIME), start)

@@ -202,7 +202,9 @@ def _switching(effect: Effect, recording: Recording) -> list[Statement]:
     words = effect.text.split()
     if effect.kind == "OPERATE":
         device, on = words[0].upper(), words[1] == "ON"
-        output, where = (cell.devices or {}).get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
+        known = (cell.devices or {}).get(device)
+        output = None if known is None else known.output
+        where = f"`[devices]` `{device} = {{ output = 1 }}`"
     else:
         device, on = str(effect.arm), effect.kind == "GRASP"
         output, where = (

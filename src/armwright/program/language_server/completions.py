@@ -338,7 +338,7 @@ class _ItemFactory:
     def devices(self, operand: _OperandRule) -> Iterator[CompletionItem]:
         """Give the devices of the cell."""
         if operand.inputs and self._analysis.cell is not None:
-            for name in sorted(self._analysis.cell.wiring.inputs):
+            for name in sorted(self._analysis.cell.inputs):
                 yield self._item(self._match_case(name), Kind.Property, "", "input")
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
