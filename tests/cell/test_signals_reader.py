@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from armwright.cell.outputs import Device
 from armwright.cell.reader import read_cell
 from armwright.cell.signals import Input
 from armwright.errors import FileFormatError
@@ -33,14 +34,14 @@ PLAIN = {{}}
     )
     cell = read_cell(path)
 
-    assert cell.wiring.inputs == {
+    assert cell.inputs == {
         "DOOR": Input(start=1.0, timeline=((0.5, 0.0), (2.0, 1.0))),
         "PRESSED": Input(follows="PRESS", delay=0.8),
         "ASKED": Input(event="READY", pulse=0.2),
         "LEVEL": Input(analogue=True, start=-2.5, timeline=((1.0, 3.5),)),
         "PLAIN": Input(),
     }
-    assert (set(cell.devices or ()), cell.wiring.analogue_devices) == ({"PRESS", "VALVE"}, {"VALVE"})
+    assert cell.devices == {"PRESS": Device(), "VALVE": Device(analogue=True)}
 
 
 @pytest.mark.parametrize(

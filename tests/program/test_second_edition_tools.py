@@ -4,7 +4,7 @@ import attrs
 import pytest
 from lsprotocol import types as lsp
 
-from armwright.cell.signals import Input, Wiring
+from armwright.cell.signals import Input
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.expressions import ExpressionError
 from armwright.program.formatter.format import formatted
@@ -91,7 +91,7 @@ def test_wait_in_a_block_of_a_session() -> None:
 
 def stopped(text: str = PROGRAM) -> Debugger:
     """Stand in front of the first statement of a program."""
-    cell = attrs.evolve(cell_of("cell1"), wiring=Wiring(inputs={"DOOR": Input(start=1.0)}))
+    cell = attrs.evolve(cell_of("cell1"), inputs={"DOOR": Input(start=1.0)})
     debugger = Debugger(code_of(text, cell), cell)
     debugger.begin()
     debugger.run_slice()

@@ -8,7 +8,8 @@ import pytest
 
 from armwright.cell.hardware import DeviceError, SimulatedHardware
 from armwright.cell.model import Cell
-from armwright.cell.signals import Input, Signals, Wiring
+from armwright.cell.outputs import Device
+from armwright.cell.signals import Input, Signals
 from armwright.cell.simulator import Simulator
 from armwright.physics.world import PhysicsCell
 from armwright.program import Source, compile as translate, run as run_program
@@ -31,11 +32,11 @@ INPUTS = {
 
 
 def signals_cell(**inputs: Input) -> Cell:
-    devices = frozenset({"LAMP", "PRESS", "VALVE"})
+    devices = {"LAMP": Device(), "PRESS": Device(), "VALVE": Device(analogue=True)}
     return attrs.evolve(
         cell_of("cell1"),
         devices=devices,
-        wiring=Wiring(inputs={**INPUTS, **inputs}, analogue_devices=frozenset({"VALVE"})),
+        inputs={**INPUTS, **inputs},
     )
 
 

@@ -314,6 +314,18 @@ def test_errors() -> None:
     assert failure("VAR n : SCALAR ; BEGIN n = 0 ; WHEN 1 / n > 0 DO n = 2 ; PAUSE 1 END.").diagnostic.code == "E240"
 
 
+def test_errors_beside_branches() -> None:
+    """An error that an action recovers from ends no branch; one in a branch ends the action too."""
+    within = """WHEN INPUT(go) DO BEGIN TRY m = 1 / 0 RECOVER PRINT("action", TIME) END ; PAUSE 0.1 END ;
+    COBEGIN BEGIN PAUSE 0.5 ; PRINT("branch", TIME) END ; BEGIN PAUSE 0.1 END COEND ;"""
+    assert lines(f'{within} PRINT("over", TIME)', GO=at(0.3)) == ["action 0.3", "branch 0.5", "over 0.5"]
+
+    beside = """TRY WHEN INPUT(go) DO TRY PAUSE 1 ; PRINT("wrong") RECOVER PRINT("wrong") END ;
+    COBEGIN BEGIN PAUSE 0.5 ; m = 1 / 0 END ; BEGIN PAUSE 3 END COEND RECOVER PRINT("recovered", TIME) END ;
+    PAUSE 2 ;"""
+    assert lines(beside, GO=at(0.3)) == ["recovered 0.5"]
+
+
 def test_an_error_ends_a_move_that_was_put_aside() -> None:
     """Where the action has moved the arm elsewhere and fails, the MOVE that it interrupted is over, and recorded so."""
     text = f"""TRY WHEN INPUT(go) DO BEGIN MOVE ARM_1 TO f ; RAISE jam END ; {MOVES["LINE"]} RECOVER PRINT(TIME) END ;
@@ -407,7 +419,7 @@ def test_no_deadlock() -> None:
 
 def test_same_bits_again() -> None:
     """The same program has the same run, to the last bit, also with two arms that interrupt one another's waits."""
-    cell = attrs.evolve(cell_of("cell2"), wiring=signals_cell(GO=at(0.2, 0.3, 0.6)).wiring)
+    cell = attrs.evolve(cell_of("cell2"), inputs=signals_cell(GO=at(0.2, 0.3, 0.6)).inputs)
     text = """VAR f, g : FRAME ; n : SCALAR ; ready : EVENT ;
     BEGIN f = ARM_1 * XYZ(0,0,-0.05) ; g = ARM_2 * XYZ(0,0,-0.05) ; n = 0 ;
     COBEGIN
@@ -501,3 +513,10 @@ def test_ticks_of_a_watched_move() -> None:
         line_after(debugger, "tick")
 
     assert debugger.machine.state.effects[-1].t0 == pytest.approx(0.006, abs=1.1e-3)
+
+
+def test_trace() -> None:
+    """The trace names a WHEN as the program does, or by what it has written."""
+    recording = program("WHEN a : n > 0 DO m = 1 ; WHEN PRIORITY 2 : n >  0 DO m = 2 ; n = 1 ; PAUSE 0.1")
+
+    assert [effect.text for effect in of_kind(recording, "WHEN")] == ["WHEN PRIORITY 2 : n > 0", "WHEN a"]

@@ -11,9 +11,9 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.outputs import Controller, Output
+from armwright.cell.outputs import Controller, Device
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
-from armwright.cell.signals import Wiring
+from armwright.cell.signals import Input
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
@@ -33,8 +33,8 @@ def _as_joint_target(value: ArrayLike) -> Array:
     return read_only(floats(value, "q"))
 
 
-def _as_devices(value: Collection[str] | None) -> Mapping[str, Output | None] | None:
-    return value if value is None or isinstance(value, Mapping) else dict.fromkeys(value)
+def _as_devices(value: Collection[str] | None) -> Mapping[str, Device] | None:
+    return value if value is None or isinstance(value, Mapping) else dict.fromkeys(value, Device())
 
 
 def _as_gravity(value: ArrayLike) -> Array:
@@ -134,9 +134,8 @@ class Cell:
         visions: other answers of the camera by frame name, in order, (4, 4) relative to the camera.
         camera_repeats: whether the camera repeats its last answer for a frame; otherwise it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
-        devices: that can be operated, by name, with the output of a controller that switches each, as far as it is
-            known; None allows any name.
-        wiring: its inputs, and which of its devices are analogue.
+        devices: that can be operated, by name; None allows any name.
+        inputs: that programs read, by name, and how each behaves in a simulated cell.
         contact: plane with which arms and what they carry come into contact.
         alarms: what stops a program in this cell with physics.
         vision_time: time that the camera takes for an answer [s].
@@ -165,8 +164,8 @@ class Cell:
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
-    devices: Mapping[str, Output | None] | None = attrs.field(default=None, converter=_as_devices)
-    wiring: Wiring = attrs.field(factory=Wiring)
+    devices: Mapping[str, Device] | None = attrs.field(default=None, converter=_as_devices)
+    inputs: Mapping[str, Input] = attrs.field(factory=dict)
     contact: ContactPlane = attrs.field(factory=ContactPlane)
     alarms: Alarms = attrs.field(factory=Alarms)
     vision_time: float = 0.1
@@ -185,6 +184,11 @@ class Cell:
             for name, arm in self.arms.items()
         }
         object.__setattr__(self, "arms", arms)
+
+    def output_of(self, device: str) -> Output | None:
+        """Return the output of a controller that switches a device; None where the cell does not know it."""
+        known = (self.devices or {}).get(device)
+        return None if known is None else known.output
 
     @property
     def seen_parts(self) -> Mapping[str, str]:

@@ -18,6 +18,19 @@ class Output:
     signal: str | None = None
 
 
+@attrs.frozen(kw_only=True)
+class Device:
+    """A device of a cell, which programs operate.
+
+    Attributes:
+        output: of a controller that switches it; None where none is known.
+        analogue: whether it can be set to any number, and not only on and off.
+    """
+
+    output: Output | None = None
+    analogue: bool = False
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Encoders:
     """How drives count their positions behind the gears: those of the joints, where no drives are coupled.

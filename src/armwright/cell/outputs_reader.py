@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from armwright.cell.entries import read_name, refuse_too_many
-from armwright.cell.outputs import Controller, Encoders, Output
+from armwright.cell.outputs import Controller, Device, Encoders, Output
 from armwright.files.document import Table
 
 # No controller has more outputs; names of signals are identifiers of RAPID.
@@ -33,17 +33,15 @@ def read_address(table: Table, key: str) -> Output | None:
     return None if number is None and signal is None else Output(number=number, signal=signal)
 
 
-def read_devices(table: Table) -> tuple[dict[str, Output | None], frozenset[str]]:
+def read_devices(table: Table) -> dict[str, Device]:
     """Read the devices of a cell: the outputs that they are connected to, and which can be set to any number."""
     refuse_too_many(table, "entries")
-    devices: dict[str, Output | None] = {}
-    analogue: set[str] = set()
+    devices: dict[str, Device] = {}
     for key in table:
         name, entry = read_name(table, key, devices), table.table(key)
-        if entry.flag("analogue"):
-            analogue.add(name)
-        devices[name] = read_output(entry)
-    return devices, frozenset(analogue)
+        analogue = entry.flag("analogue")
+        devices[name] = Device(output=read_output(entry), analogue=analogue)
+    return devices
 
 
 def read_controller(table: Table, joints: int) -> Controller:

@@ -22,7 +22,6 @@ from armwright.cell.names import arm_name
 from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
-from armwright.cell.signals import Wiring
 from armwright.cell.signals_reader import read_inputs
 from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
@@ -99,7 +98,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
-    devices, analogue_devices = read_devices(top.table("devices")) if "devices" in top else (None, frozenset[str]())
+    devices = read_devices(top.table("devices")) if "devices" in top else None
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
@@ -118,7 +117,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=devices,
-        wiring=Wiring(inputs=read_inputs(top.table("inputs"), devices), analogue_devices=analogue_devices),
+        inputs=read_inputs(top.table("inputs"), devices),
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,

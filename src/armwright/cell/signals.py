@@ -42,19 +42,6 @@ class Input:
     address: Output | None = None
 
 
-@attrs.frozen(kw_only=True)
-class Wiring:
-    """What a cell has beside devices that are on or off.
-
-    Attributes:
-        inputs: by name, what programs read, and how that behaves in a simulated cell.
-        analogue_devices: names of the devices that can be set to any number.
-    """
-
-    inputs: Mapping[str, Input] = attrs.field(factory=dict)
-    analogue_devices: frozenset[str] = frozenset()
-
-
 def latest_change(changes: Changes, time: float) -> tuple[float, float] | None:
     """Return the last change up to a time [s]; None where there is none."""
     index = bisect_right(changes, time + _SAME_TIME, key=itemgetter(0))

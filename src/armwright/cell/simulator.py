@@ -84,7 +84,7 @@ class Simulator:
         self._cell, self._scene = cell, scene
         self._courses: dict[str, ContactCourse] = {}
         self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
-        self._signals = Signals(cell.wiring.inputs)
+        self._signals = Signals(cell.inputs)
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
         self._parts = PartPoses(cell)
         # Wrenches that the sensors of forces take for zero.
@@ -315,7 +315,8 @@ class Simulator:
             DeviceError: there is no such device, or it can only be on or off.
         """
         self._require_device(device)
-        if device not in self._cell.wiring.analogue_devices:
+        known = (self._cell.devices or {}).get(device)
+        if known is None or not known.analogue:
             what = f"device {device} of cell '{self._cell.name}'"
             raise DeviceError(f"{what} is on or off, and cannot be set to a number")
         self._signals.write(device, value)
@@ -352,7 +353,7 @@ class Simulator:
             DeviceError: there is no such input, or it is of the other kind.
         """
         self._require_input(name)
-        if self._cell.wiring.inputs[name].analogue is not analogue:
+        if self._cell.inputs[name].analogue is not analogue:
             kind, function = ("digital", "INPUT") if analogue else ("analogue", "ANALOG")
             raise DeviceError(f"input {name} of cell '{self._cell.name}' is {kind}; read it by {function}")
         return self._signals.input(name)
@@ -370,12 +371,12 @@ class Simulator:
         self._require_input(name)
         if not math.isfinite(value):
             raise DeviceError(f"input {name} of cell '{self._cell.name}': expected a finite number, got {value:g}")
-        if not self._cell.wiring.inputs[name].analogue and value not in (0.0, 1.0):
+        if not self._cell.inputs[name].analogue and value not in (0.0, 1.0):
             raise DeviceError(f"input {name} of cell '{self._cell.name}' is digital: expected 0 or 1, got {value:g}")
         self._signals.set_input(name, value, time)
 
     def _require_input(self, name: str) -> None:
-        inputs = self._cell.wiring.inputs
+        inputs = self._cell.inputs
         if name not in inputs:
             near = closest(name, inputs)
             hint = f"; did you mean {near}?" if near else ""

@@ -288,7 +288,7 @@ def _set_device(device: str, *, on: bool, effect: Effect, recording: Recording) 
             f"`[arms.{device}]` `gripper_output = {{ output = 1 }}`",
         )
     else:
-        output, where = (cell.devices or {}).get(device), f"`[devices]` `{device} = {{ output = 1 }}`"
+        output, where = cell.output_of(device), f"`[devices]` `{device} = {{ output = 1 }}`"
     if output is None:
         subject = f"the gripper of {device}" if device in cell.arms else device
         text = f"the cell file does not say which output of the controller switches {subject}"

@@ -341,7 +341,7 @@ class ProgramRun:
         """Return what the inputs of the cell are at the time that is shown."""
         hardware = self._computed.machine.hardware
         assert isinstance(hardware, SimulatedHardware)  # noqa: S101 - the debugger runs no others
-        return {name: hardware.input_at(name, self.time) for name in self._cell.wiring.inputs}
+        return {name: hardware.input_at(name, self.time) for name in self._cell.inputs}
 
     def pictures(self) -> tuple[Picture, ...]:
         """Return the pictures that cameras have taken up to the time that is shown."""

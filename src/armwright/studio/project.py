@@ -280,7 +280,7 @@ class Project:
             UnknownNameError: there is none of this name.
             InvalidValueError: a digital one would be neither 0 nor 1.
         """
-        inputs = self.workbench.cell.wiring.inputs
+        inputs = self.workbench.cell.inputs
         if name not in inputs:
             raise UnknownNameError("input", name, inputs)
         if not inputs[name].analogue and value not in (0.0, 1.0):
@@ -291,7 +291,7 @@ class Project:
             self.run.set_input(name, value)
 
     def _input_states(self) -> dict[str, dict[str, Any]]:
-        inputs = self.workbench.cell.wiring.inputs
+        inputs = self.workbench.cell.inputs
         values = {name: source.start for name, source in inputs.items()} | self.inputs
         if self.run is not None:
             values = self.run.inputs()

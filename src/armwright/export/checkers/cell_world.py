@@ -24,10 +24,10 @@ class CellWorld:
         """
         self.step = cell.period
         self._ends, self._count = ends, 0
-        self._signals = Signals(cell.wiring.inputs)
-        addressed = {name: source.address for name, source in cell.wiring.inputs.items()}
+        self._signals = Signals(cell.inputs)
+        addressed = {name: source.address for name, source in cell.inputs.items()}
         self._inputs = _names(addressed)
-        self._outputs = _names(cell.devices or {})
+        self._outputs = _names({name: device.output for name, device in (cell.devices or {}).items()})
 
     @property
     def now(self) -> float:

@@ -73,7 +73,7 @@ def _statements(code: ProgramCode, recording: Recording) -> Iterator[tuple[State
 def _switched(effect: Effect, recording: Recording) -> list[Statement]:
     if "seconds" in effect.data:
         name = str(effect.data["device"])
-        output = (recording.cell.devices or {})[name]
+        output = recording.cell.output_of(name)
         assert output is not None  # noqa: S101 - the translation has refused others
         return [PulseOutput(span=effect.span, device=name, output=output, seconds=float(effect.data["seconds"]))]
     return switching(effect, recording)

@@ -237,7 +237,7 @@ def output_of(context: Context, node: tree.Node, device: tree.Name) -> Output:
     Raises:
         ExportError: the cell file does not say.
     """
-    found = (context.cell.devices or {}).get(device.key)
+    found = context.cell.output_of(device.key)
     if found is None:
         text = f"the cell file does not say which output of the controller switches {device.key}"
         advice = f"write `[devices]` `{device.key} = {{ output = 1 }}`"

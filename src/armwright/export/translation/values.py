@@ -236,10 +236,10 @@ def _function(context: Context, node: tree.Function) -> Value:
 def _signal(context: Context, node: tree.Function) -> Value:
     name, is_input = name_of(node.arguments[0]).key, node.name.key == "INPUT"
     if is_input:
-        known = context.cell.wiring.inputs.get(name)
+        known = context.cell.inputs.get(name)
         address = None if known is None else known.address
     else:
-        address = (context.cell.devices or {}).get(name)
+        address = context.cell.output_of(name)
     if address is None:
         table, key = ("inputs", "input") if is_input else ("devices", "output")
         what = "input" if is_input else "output"

@@ -365,7 +365,7 @@ class _ItemFactory:
             for name, target in sorted(self._analysis.cell.joint_targets.items()):
                 yield self._item(self._match_case(name), Kind.Property, "", f"joint target of {target.arm}")
         if operand.inputs and self._analysis.cell is not None:
-            for name in sorted(self._analysis.cell.wiring.inputs):
+            for name in sorted(self._analysis.cell.inputs):
                 yield self._item(self._match_case(name), Kind.Property, "", "input")
         if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):

@@ -203,8 +203,8 @@ def _describe_arm(analysis: Analysis, key: str) -> list[str]:
 
 def _describe_device(analysis: Analysis, key: str) -> str:
     cell = analysis.cell
-    if cell is not None and key in cell.wiring.inputs:
-        return f"{'an analogue' if cell.wiring.inputs[key].analogue else 'a digital'} input of {cell.name}"
+    if cell is not None and key in cell.inputs:
+        return f"{'an analogue' if cell.inputs[key].analogue else 'a digital'} input of {cell.name}"
     if cell is None or cell.devices is None:
         return "a device"
     return f"a device of {cell.name}" if key in cell.devices else f"{cell.name} has no such device"

@@ -72,9 +72,10 @@ def known_cell(cell: Cell) -> KnownCell:
         arms=frozenset(cell.arms),
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=None if cell.devices is None else frozenset(cell.devices),
-        analogue=cell.wiring.analogue_devices
-        | {name for name, source in cell.wiring.inputs.items() if source.analogue},
-        inputs=frozenset(cell.wiring.inputs),
+        analogue=frozenset(
+            name for some in (cell.devices or {}, cell.inputs) for name, one in some.items() if one.analogue
+        ),
+        inputs=frozenset(cell.inputs),
         visions=cell.seen_frames,
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
         joints={name: "".join("RP"[not it.revolute] for it in arm.arm.joints) for name, arm in cell.arms.items()},

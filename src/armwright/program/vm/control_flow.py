@@ -212,10 +212,11 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
     """
     span, at_rest = error.diagnostic.span, machine.state.ticks
     while True:
-        ends = [_cancel_branch(machine, branch, span) for branch in process.branches]
-        process.branches = []
+        kept, ends = _recovering_activation(process, error.kind), []
+        if not _interrupts_branches(process, process.stack[:kept]):
+            ends = [_cancel_branch(machine, branch, span) for branch in process.branches]
+            process.branches = []
         # The arm of the branch that failed may be the last to come to rest.
-        kept = _recovering_activation(process, error.kind)
         process.wake_tick = at_rest = max([at_rest, *ends, _stop_motion(machine, process, span, kept)])
         abandon_wait(machine, process)
         process.pending_effect = None
@@ -231,6 +232,29 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
             machine.state.ticks = process.wake_tick
             return False
         process = process.parent
+        at_rest = max(at_rest, _leave_actions(machine, process, span))
+
+
+def _interrupts_branches(process: Process, activations: Sequence[Activation]) -> bool:
+    """Whether one of these is the action of a WHEN that interrupts the wait for branches, which still run."""
+    waits = (one.interrupted.waiting for one in activations if one.interrupted is not None)
+    is_joining = process.waiting is not None and process.waiting.kind == "branches"
+    return not is_joining and any(wait is not None and wait.kind == "branches" for wait in waits)
+
+
+def _leave_actions(machine: Machine, process: Process, span: Span) -> int:
+    """Leave the actions of WHENs that interrupt the wait for branches of which one has failed.
+
+    Returns:
+        When the arm that they moved is at rest [ticks].
+    """
+    end = machine.state.ticks
+    while _interrupts_branches(process, process.stack):
+        outside = max(depth for depth, one in enumerate(process.stack) if one.interrupted is not None)
+        end = max(end, _stop_motion(machine, process, span, outside))
+        while len(process.stack) > outside:
+            leave_activation(machine, process, span)
+    return end
 
 
 def _recovering_activation(process: Process, kind: str) -> int:

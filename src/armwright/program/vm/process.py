@@ -136,7 +136,7 @@ class Watch:
     Attributes:
         start: its instruction, which tells it from others.
         name: that the program gives it; empty where it has none.
-        text: its name, or else its condition, for people.
+        title: for people: with its name, or else as it is written.
         priority: the larger is served first, and interrupts the smaller.
         condition: first instruction of the condition.
         result: the value in passing that it leaves.
@@ -152,7 +152,7 @@ class Watch:
 
     start: int
     name: str
-    text: str
+    title: str
     priority: float
     condition: int
     result: str

@@ -36,7 +36,7 @@ def _arm(machine: Machine, process: Process, step: Instruction) -> None:
     watch = Watch(
         start=process.pc - 1,
         name=name,
-        text=machine.spelling(name) if name else written,
+        title=f"WHEN {machine.spelling(name)}" if name else written,
         priority=machine.read_number(process, step.operands[3], span),
         condition=jump_target(step, 0),
         result=str(step.operands[1]),
@@ -128,7 +128,7 @@ def _begin_due(machine: Machine, process: Process) -> None:
     watch.due = False
     cause = process.followed_motion or process.waiting or process.pending_effect
     interruption = Interruption(
-        title=f"WHEN {watch.text}",
+        title=watch.title,
         priority=watch.priority,
         wake_tick=process.wake_tick,
         waiting=process.waiting,
