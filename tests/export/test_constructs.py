@@ -13,7 +13,7 @@ from armwright.export import ExportError, export_run
 from armwright.program import Recording, Source, run
 from export.cases import CELLS, ROOT
 
-PAGE = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "export.md").read_text(encoding="utf-8").partition("## Plan mode")[2]
 HEAD, _, *ROWS = PAGE[PAGE.index("| construct") :].partition("\n\n")[0].splitlines()
 TARGETS = [cell.strip() for cell in HEAD.strip("|").split("|")][1:]
 TABLE = {
@@ -39,6 +39,7 @@ PROGRAMS = {
     "OPEN to a width": "OPEN ARM_1 TO 0.04 ;",
     "OPERATE": "OPERATE LAMP ON ; OPERATE LAMP OFF ;",
     "OPERATE of a device without an output": "OPERATE HORN ON ;",
+    "PULSE": "PULSE LAMP FOR 0.2 ;",
     "PAUSE": "PAUSE 0.5 ;",
     "PRINT": 'PRINT ("n", 2) ;',
     "IF, WHILE, FOR, procedures": "n = 2 ; IF n > 1 THEN away() ; WHILE n < 4 DO n = 4 ; FOR n = 1 TO 2 DO away() ;",

@@ -25,6 +25,10 @@ def _event(effect: Effect) -> dict[str, object] | None:
     if effect.kind in _SWITCHED:
         width = {"width": float(words[-1])} if "TO" in words else {}
         return {"gripper": effect.arm, "closed": _SWITCHED[effect.kind], **width}
+    if "seconds" in effect.data:
+        return {"device": effect.data["device"], "pulse_s": effect.data["seconds"]}
+    if "value" in effect.data:
+        return {"device": effect.data["device"], "value": effect.data["value"]}
     if effect.kind == "OPERATE":
         return {"device": words[0].upper(), "on": words[1] == "ON"}
     return {"text": effect.data["printed"]} if effect.kind == "PRINT" else None
