@@ -111,10 +111,9 @@ def test_programs_and_motions(tmp_path: Path) -> None:
         assert (done.returncode, words in done.stdout) == (0, True)
         assert (out / "loop.script").read_text(encoding="ascii").count("while ") == loops
     code = tmp_path / "loop.rlc"
-    armwright("check", program, "--cell", UR5, "--code", code)
-    if code.exists():
-        done = armwright("export", "urscript", code, "--cell", UR5, "--mode", "program")
-        assert (done.returncode, "intermediate code" in done.stderr) == (2, True)
+    armwright("code", program, "--cell", UR5, "-o", code)
+    done = armwright("export", "urscript", code, "--cell", UR5, "--mode", "program")
+    assert (done.returncode, "intermediate code" in done.stderr) == (2, True)
 
 
 def test_hostile_names_of_files(tmp_path: Path) -> None:
