@@ -100,6 +100,22 @@ def test_mistakes_of_the_call(tmp_path: Path) -> None:
     assert armwright("export", "krl", PALLETISE, "--cell", tmp_path / "none.toml").returncode == 4
 
 
+def test_programs_and_motions(tmp_path: Path) -> None:
+    """A language of a controller gets the program by default, and the motion of the run by --mode plan."""
+    program = tmp_path / "loop.rlo"
+    loop = "VAR n : SCALAR ; BEGIN FOR n = 1 TO 3 DO MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.01) END."
+    program.write_text(loop, encoding="utf-8")
+    for mode, words, loops in (((), "the program, run for", 1), (("--mode", "plan"), "s of motion", 0)):
+        out = tmp_path / words.split()[0]
+        done = armwright("export", "urscript", program, "--cell", UR5, *mode, "-o", out)
+        assert (done.returncode, words in done.stdout) == (0, True)
+        assert (out / "loop.script").read_text(encoding="ascii").count("while ") == loops
+    code = tmp_path / "loop.rlc"
+    armwright("code", program, "--cell", UR5, "-o", code)
+    done = armwright("export", "urscript", code, "--cell", UR5, "--mode", "program")
+    assert (done.returncode, "intermediate code" in done.stderr) == (2, True)
+
+
 def test_hostile_names_of_files(tmp_path: Path) -> None:
     """A program whose file has quotes and commands in its name becomes a program with a plain name."""
     program = tmp_path / "x\"); halt() #\n;END 'a.rlo"
@@ -108,7 +124,7 @@ def test_hostile_names_of_files(tmp_path: Path) -> None:
         done = armwright("export", target, program, "--cell", cell, "-o", tmp_path / target)
 
         assert done.returncode == 0
-        (path,) = (path for path in (tmp_path / target).iterdir() if path.suffix != ".json")
+        (path,) = (path for path in (tmp_path / target).iterdir() if path.suffix not in (".json", ".dat"))
         assert path.stem == ("X_HALT_E" if target == "fanuc" else "x_halt_END_a")
         text = path.read_text(encoding="ascii")
         assert "'a" not in text

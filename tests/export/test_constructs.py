@@ -13,7 +13,7 @@ from armwright.export import ExportError, export_run
 from armwright.program import Recording, Source, run
 from export.cases import CELLS, ROOT
 
-PAGE = (ROOT / "docs" / "export.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "export.md").read_text(encoding="utf-8").partition("## Plan mode")[2]
 HEAD, _, *ROWS = PAGE[PAGE.index("| construct") :].partition("\n\n")[0].splitlines()
 TARGETS = [cell.strip() for cell in HEAD.strip("|").split("|")][1:]
 TABLE = {

@@ -239,3 +239,15 @@ def test_every_convention_has_sources() -> None:
             re.search(r"\w", part) for one in convention.sources for part in (one.says, one.document, one.revision)
         )
         assert len(set(convention.ros_joints)) == 6
+
+
+@pytest.mark.parametrize("name", conventions()["universal-robots"].arms)
+def test_arms_of_universal_robots_by_name(name: str) -> None:
+    """All arms of the maker in the catalogue count joints as their parameters do: from the same zero, in one sense."""
+    convention = find_convention(load_arm(name), None)
+    assert convention is not None
+    mapped = controller_arm(load_arm(name), convention)
+
+    assert convention.name == "universal-robots"
+    np.testing.assert_allclose(mapped.zeros, 0, atol=1e-12)
+    assert (mapped.signs == 1).all()

@@ -224,6 +224,25 @@ def test_a_base_in_the_world(tmp_path: Path) -> None:
     assert "pose_trans(world, feeder)" in done.files["palletise.script"]
 
 
+CLASHES = """UNITS MM ;
+VAR change, waited, inverse_of : FRAME ; n_next, n : SCALAR ;
+PROCEDURE movej(x : SCALAR) ; BEGIN PRINT("called", x) END ;
+BEGIN
+  n_next = 7 ; change = ARM_1 ; waited = ARM_1 * XYZ(0, 20, 0) ; AFFIX waited TO change ;
+  change = change * XYZ(0, 0, 10) ;
+  FOR n = 1 TO 2 DO movej(n) ;
+  inverse_of = waited ; AFFIX inverse_of TO ARM_1 ; MOVE inverse_of TO change ;
+  WAIT UNTIL INPUT(large) WITHIN 0.1 ELSE PRINT(n_next, X(change), Y(waited)) ;
+END.
+"""
+
+
+@pytest.mark.parametrize("target", CELLS)
+def test_names_of_the_writer_are_no_names_of_the_program(target: str) -> None:
+    """Variables and procedures that are called as the writer calls its own, or as the language does, stay apart."""
+    assert {one.quantity: one.worst for one in exported(target, CLASHES).proof.comparisons}[STATEMENTS] == 0
+
+
 # ---- meanings ------------------------------------------------------------------------------------------------------
 
 MEANINGS = {
@@ -255,7 +274,7 @@ def test_meanings(target: str, meaning: str) -> None:
 @pytest.mark.share(0.05)
 def test_inverses_of_krl(sample) -> None:
     """The inverse of a frame that is computed in KRL is that of linear algebra, at quarter turns of B too."""
-    helper = krl_program.HELPERS["INVERSE_OF"].format(name="inverse_of")
+    helper = krl_program.HELPERS["INVERSE OF"].format(name="inverse_of")
     for rng in sample.cases(400):
         angles = rng.uniform(-180, 180, 3) if rng.random() < 0.7 else rng.choice([-90.0, 0.0, 90.0, 180.0], 3)
         place = rng.uniform(-900, 900, 3)

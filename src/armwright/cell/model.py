@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
-from armwright.cell.outputs import Controller, Device
+from armwright.cell.outputs import Controller, Device, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.signals import Input
 from armwright.cell.trials import Trials

@@ -88,8 +88,9 @@ def _show(
         return
     if quiet:
         return
-    what = "the program, run for" if exported.proof.mode == "program" else "the motion of"
-    print(f"{exported.target}: {what} {recording.duration:.6g} s in {recording.cell.name}, proved:")
+    is_program = exported.proof.mode == "program"
+    what = f"the program, run for {recording.duration:.6g} s" if is_program else f"{recording.duration:.6g} s of motion"
+    print(f"{exported.target}: {what} in {recording.cell.name}, proved:")
     for line in exported.proof.lines():
         print(f"  {line}")
     if output is not None:

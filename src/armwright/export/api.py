@@ -97,8 +97,8 @@ def export_program(
         program: the path of its file, its text as a ``Source``, or a compiled program.
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         name: of the exported program; that of the file without one.
-        mode: ``program`` for the program with its control flow, ``plan`` for what it did in the cell; ``program`` to
-            ``urscript`` and ``plan`` to all others without it.
+        mode: ``program`` for the program with its control flow, ``plan`` for what it did in the cell; without it
+            ``program`` to ``urscript``, ``krl`` and ``rapid``, and ``plan`` to all others.
 
     Returns:
         The files, with their proof; every difference from the run is within what is allowed.
@@ -127,7 +127,7 @@ def export_compiled(target: Target, compiled: Compilation, recording: Recording,
     """Return a program, with its control flow, for a controller; see ``export_program``.
 
     Args:
-        target: ``urscript``.
+        target: ``urscript``, ``krl`` or ``rapid``.
         compiled: the program.
         recording: its run in the cell; the exported program is run there too, and does the same.
         name: of the exported program.

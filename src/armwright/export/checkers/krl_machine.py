@@ -1,7 +1,7 @@
 """Running programs in KRL, as far as program mode writes them."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -32,8 +32,8 @@ from armwright.export.checkers.machine import (
 from armwright.export.checkers.orientations import from_zyx_degrees
 
 _FRAME, _AXES = tuple("XYZABC"), tuple(f"A{i}" for i in range(1, 7))
-_SIMPLE = {"ABS": abs, "SQRT": math.sqrt}
-_ANGLES = {"SIN": math.sin, "COS": math.cos, "TAN": math.tan}
+_SIMPLE: dict[str, Callable[[float], float]] = {"ABS": abs, "SQRT": math.sqrt}
+_ANGLES: dict[str, Callable[[float], float]] = {"SIN": math.sin, "COS": math.cos, "TAN": math.tan}
 # A frame is its fields by name; a position has S and T too, as far as they are known.
 _Frame = dict[str, float]
 
@@ -358,8 +358,15 @@ class _Machine(Machine):
 
 def _as_type(kind: str, value: Any, line: int) -> Any:
     """Return a value as a variable of a type holds it: whole numbers are rounded."""
-    wanted = {"INT": (int, float), "REAL": (int, float), "BOOL": bool, "FRAME": dict, "POS": dict}.get(kind, object)
-    if not isinstance(value, wanted) or (isinstance(value, bool) and kind in ("INT", "REAL")):
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    fits = {
+        "INT": number,
+        "REAL": number,
+        "BOOL": isinstance(value, bool),
+        "FRAME": isinstance(value, dict),
+        "POS": isinstance(value, dict),
+    }
+    if not fits.get(kind, True):
         raise CheckError(f"line {line}: {value!r} is no {kind}")
     if kind == "INT":
         return math.floor(value + 0.5)

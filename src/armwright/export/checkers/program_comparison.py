@@ -99,8 +99,11 @@ class _ComparingRun(Comparing):
             self.times.add(max(abs(found - planned) - action.rounding - _SAME_TIME, 0.0), action.line)
 
     def _configuration(self, action: LineAction) -> None:
-        """Take note of wrong words: on lines controllers do not need them, and those of one pass are enough."""
-        if action.configuration:
+        """Take note of wrong words: on lines controllers do not need them, and those of one pass are enough.
+
+        A corner that is rounded is not reached, and the words are those of the path beside it.
+        """
+        if action.configuration and not action.zone:
             words = self._postures.words(self._program.mapped.joints(self._q))
             wrong = sum(value not in words[word] for word, value in action.configuration.items())
             self._wrong[action.line] = min(wrong, self._wrong.get(action.line, wrong))

@@ -1,7 +1,7 @@
 """Running programs in RAPID, as far as program mode writes them."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -36,8 +36,12 @@ _INITIAL: dict[str, Any] = {"num": 0.0, "bool": False, "string": ""}
 _NORM = 1e-6
 # Of zone data: the part for the tool point.
 _PATH_ZONE = 1
-_SIMPLE = {"Abs": abs, "Sqrt": math.sqrt, "Round": lambda value: math.floor(value + 0.5)}
-_ANGLES = {"Sin": math.sin, "Cos": math.cos, "Tan": math.tan}
+_SIMPLE: dict[str, Callable[[float], float]] = {
+    "Abs": abs,
+    "Sqrt": math.sqrt,
+    "Round": lambda value: math.floor(value + 0.5),
+}
+_ANGLES: dict[str, Callable[[float], float]] = {"Sin": math.sin, "Cos": math.cos, "Tan": math.tan}
 
 
 def run(texts: Sequence[str], world: World) -> ReadProgram:
@@ -167,7 +171,7 @@ class _Machine(Machine):
         value = self.value(node)
         if value != round(value):
             raise CheckError(f"line {line}: {value} is no index")
-        return round(value)
+        return int(value)
 
     # ---- instructions ----------------------------------------------------------------------------------------------
 

@@ -199,6 +199,8 @@ class Context:
             self.refuse(node.span, text, "it stands here", "export the run by `--mode plan`")
         return found
 
+    # Keys of the translation's own have a blank, which no name of a program has.
+
     def declare(self, key: str, kind: Kind, sizes: Sequence[int] = (), initial: Value | None = None) -> Variable:
         """Declare a variable, unless it has been."""
         if key not in self.kinds:

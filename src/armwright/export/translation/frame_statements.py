@@ -61,7 +61,7 @@ def _displace(context: Context, variable: Variable, value: Value, others: Sequen
         text = f"{len(known)} frames move with this one, and each would be a line"
         context.refuse(span, text, "they move here", code="E620")
     if known:
-        change = context.declare("CHANGE", "pose")
+        change = context.declare("CHANGE OF FRAME", "pose")
         context.assign(change, simplified("compose", (value, simplified("inverse", (variable,)))), span)
         for one in known:
             context.assign(one, simplified("compose", (change, one)), span)

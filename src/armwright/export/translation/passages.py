@@ -66,6 +66,11 @@ class Run:
         if not stages:
             return self._never(legs)
         for stage in stages:
+            goal = stage.stage.goal
+            if goal is not None and goal.kind == "SPLINE" and goal.corner is None:
+                source = self._recording.code.source
+                text = "the X-spline of RLO-83 is no line with rounded corners, which is what controllers know"
+                raise refusal(source, "E619", text, stage.span, "on this MOVE", helps=["export it by `--mode plan`"])
             if stage.path is not None or stage.stage.detour is not None:
                 source = self._recording.code.source
                 text = "this MOVE goes round an obstacle, and the way round is that of one run alone"

@@ -99,9 +99,9 @@ def count(context: Context, node: tree.For) -> None:
         context.refuse_construct(node)
     first, last = value_of(context, node.first), value_of(context, node.last)
     variable = plain_variable(context, node.variable)
-    counter, limit = context.declare(f"{variable.key}_NEXT", "number"), None
+    counter, limit = context.declare(f"{variable.key} NEXT", "number"), None
     if not isinstance(last, Number):
-        limit = context.declare(f"{variable.key}_LAST", "number")
+        limit = context.declare(f"{variable.key} LAST", "number")
     context.written |= {variable.key, counter.key}
     body = context.repeated(node.body)
     context.out.append(

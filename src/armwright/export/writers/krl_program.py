@@ -50,13 +50,13 @@ from armwright.export.writers.program_text import (
     ValueText,
     chunks_of_text,
     is_whole,
+    number_of,
     program_approximations,
     program_heading,
     scaled,
 )
 from armwright.export.writers.reserved_words import KRL
 from armwright.export.writers.text import decimal, identifier, plain_lines
-from armwright.export.writers.urscript_program import number_of
 from armwright.program.language.units import NORMAL_SPEED
 
 _ATOM, _FRAMES, _PRODUCT = 9, 8, 6
@@ -112,7 +112,7 @@ class _Text(ValueText):
 
     def _index(self, value: Value) -> str:
         text = self.text(value)
-        return text if is_whole(value, self.whole) else self.call(self.helper("WHOLE"), [text])
+        return text if is_whole(value, self.whole) else self.call(self.helper("WHOLE NUMBER"), [text])
 
     def signal(self, value: Signal) -> str:
         return f"${'IN' if value.is_input else 'OUT'}[{number_of(self.code, value.address, value.name, least=1)}]"
@@ -129,20 +129,20 @@ class _Text(ValueText):
                 left = first if strength >= _FRAMES else f"({first})"
                 return f"{left}:{second if other > _FRAMES else f'({second})'}", _FRAMES
             case "inverse":
-                return self.call(self.helper("INVERSE_OF"), map(self.text, arguments)), _ATOM
+                return self.call(self.helper("INVERSE OF"), map(self.text, arguments)), _ATOM
             case "xyz":
                 lengths = [self.text(scaled(one, self.metres * _MILLIMETRES)) for one in arguments]
-                return self.call(self.helper("SHIFTED"), lengths), _ATOM
+                return self.call(self.helper("SHIFTED BY"), lengths), _ATOM
             case "rotx" | "roty" | "rotz" | "rpy":
                 angle = [self.text(scaled(one, float(np.degrees(self.radians)))) for one in arguments]
                 angles = {"rotx": ("0", "0", angle[0]), "roty": ("0", angle[0], "0"), "rotz": (angle[0], "0", "0")}
-                return self.call(self.helper("TURNED"), angles.get(name, tuple(reversed(angle)))), _ATOM
+                return self.call(self.helper("TURNED BY"), angles.get(name, tuple(reversed(angle)))), _ATOM
             case "dist":
-                return self._over(self.call(self.helper("DISTANCE"), map(self.text, arguments)))
+                return self._over(self.call(self.helper("DISTANCE OF"), map(self.text, arguments)))
             case "x" | "y" | "z":
                 if isinstance(arguments[0], Variable):
                     return self._over(f"{self.text(arguments[0])}.{name.upper()}")
-                return self._over(self.call(self.helper(f"{name.upper()}_OF"), [self.text(arguments[0])]))
+                return self._over(self.call(self.helper(f"{name.upper()} OF"), [self.text(arguments[0])]))
             case "sin" | "cos" | "tan":
                 angle = [self.text(scaled(arguments[0], float(np.degrees(self.radians))))]
                 return self.call(name.upper(), angle), _ATOM
@@ -382,13 +382,13 @@ class _Writer:
             return
         place = self._variable("TARGET", "POS")
         arguments = [self._values.text(target), str(status), str(turn)]
-        yield f"{place}={self._values.call(self._values.helper('POSTURE'), arguments)}"
+        yield f"{place}={self._values.call(self._values.helper('POSTURE OF'), arguments)}"
         yield f"{motion} {place}{way}"
 
 
 _MESSAGE = (("MESSAGE", "CHAR"), ("STATE", "STATE_T"), ("OFFSET", "INT"))
 HELPERS = {
-    "SHIFTED": """\
+    "SHIFTED BY": """\
 DEFFCT FRAME {name}(arg_x:IN,arg_y:IN,arg_z:IN)
   DECL REAL arg_x,arg_y,arg_z
   DECL FRAME arg_f
@@ -398,7 +398,7 @@ DEFFCT FRAME {name}(arg_x:IN,arg_y:IN,arg_z:IN)
   arg_f.Z=arg_z
   RETURN arg_f
 ENDFCT""",
-    "TURNED": """\
+    "TURNED BY": """\
 DEFFCT FRAME {name}(arg_a:IN,arg_b:IN,arg_c:IN)
   DECL REAL arg_a,arg_b,arg_c
   DECL FRAME arg_f
@@ -408,7 +408,7 @@ DEFFCT FRAME {name}(arg_a:IN,arg_b:IN,arg_c:IN)
   arg_f.C=arg_c
   RETURN arg_f
 ENDFCT""",
-    "POSTURE": """\
+    "POSTURE OF": """\
 DEFFCT POS {name}(arg_f:IN,arg_s:IN,arg_t:IN)
   DECL FRAME arg_f
   DECL INT arg_s,arg_t
@@ -426,7 +426,7 @@ DEFFCT POS {name}(arg_f:IN,arg_s:IN,arg_t:IN)
   ENDIF
   RETURN arg_p
 ENDFCT""",
-    "DISTANCE": """\
+    "DISTANCE OF": """\
 DEFFCT REAL {name}(arg_f:IN,arg_g:IN)
   DECL FRAME arg_f,arg_g
   DECL REAL arg_x,arg_y,arg_z
@@ -435,7 +435,7 @@ DEFFCT REAL {name}(arg_f:IN,arg_g:IN)
   arg_z=arg_f.Z-arg_g.Z
   RETURN SQRT(arg_x*arg_x+arg_y*arg_y+arg_z*arg_z)
 ENDFCT""",
-    "INVERSE_OF": """\
+    "INVERSE OF": """\
 DEFFCT FRAME {name}(arg_f:IN)
   DECL FRAME arg_f,arg_g
   DECL REAL nx,ny,nz,ox,oy,ax,ay,az,oz,sa,ca,sb,cb,sc,cc,level
@@ -468,7 +468,7 @@ DEFFCT FRAME {name}(arg_f:IN)
   ENDIF
   RETURN arg_g
 ENDFCT""",
-    "WHOLE": """\
+    "WHOLE NUMBER": """\
 DEFFCT INT {name}(arg_x:IN)
   DECL REAL arg_x
   DECL INT arg_i
@@ -476,5 +476,5 @@ DEFFCT INT {name}(arg_x:IN)
   RETURN arg_i
 ENDFCT""",
 } | {
-    f"{axis}_OF": f"DEFFCT REAL {{name}}(arg_f:IN)\n  DECL FRAME arg_f\n  RETURN arg_f.{axis}\nENDFCT" for axis in "XYZ"
+    f"{axis} OF": f"DEFFCT REAL {{name}}(arg_f:IN)\n  DECL FRAME arg_f\n  RETURN arg_f.{axis}\nENDFCT" for axis in "XYZ"
 }

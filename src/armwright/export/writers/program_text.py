@@ -4,9 +4,9 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-import numpy as np
-
 from armwright.arrays import Array
+from armwright.cell.outputs import Output
+from armwright.export.refusals import refusal
 from armwright.export.translation.code import (
     Assign,
     Call,
@@ -24,8 +24,8 @@ from armwright.export.translation.code import (
     Variable,
     every_value,
 )
-from armwright.export.translation.values import simplified
 from armwright.export.writers.text import identifier
+from armwright.program.language.source import Span
 from armwright.version import __version__
 
 _PRECEDENCE = {"or": 1, "and": 2, "not": 3, "+": 5, "-": 5, "*": 6, "/": 6, "negative": 7}
@@ -177,10 +177,6 @@ class ValueText(ABC):
         right = right if right_own > strength and right_own >= least and not right.startswith("-") else f"({right})"
         return f"{left} {word} {right}" if strength < _PRECEDENCE["*"] else f"{left}{word}{right}"
 
-    def target(self, value: Value, X_CW: Array) -> Value:
-        """Return the pose of a target, seen from the base frame of the controller."""
-        return simplified("compose", (Pose(X_CW), value))
-
     @abstractmethod
     def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
         """Return TRUE or FALSE."""
@@ -248,6 +244,14 @@ def _sum(first: Value, second: Value) -> Value:
     return Operation("+", (first, second))
 
 
-def degrees(value: float) -> float:
-    """Return an angle in degrees."""
-    return float(np.degrees(value))
+def number_of(code: ProgramCode, address: Output, name: str, span: Span | None = None, least: int = 0) -> int:
+    """Return the number of an input or output.
+
+    Raises:
+        ExportError: it has none, or one that the controller does not count.
+    """
+    if address.number is None or address.number < least:
+        text = f"the cell file gives {name} no number from {least} on, and the language knows it by its number"
+        helps = ["write its number as the key `output`, or `input`"]
+        raise refusal(code.source, "E615", text, span or Span(0, 0), "it is used in this program", helps=helps)
+    return address.number

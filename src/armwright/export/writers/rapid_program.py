@@ -315,7 +315,7 @@ class _Writer:
         configuration = ",".join(map(str, words))
         if isinstance(value, Pose):
             return f"[{short_pose(value.X)[1:-1]},[{configuration}],{NO_AXES}]"
-        return f"{self._values.helper('TARGET')}({self._values.text(value)},{configuration})"
+        return f"{self._values.helper('TARGET AT')}({self._values.text(value)},{configuration})"
 
     def _rate(self, one: MoveTo) -> str:
         known = one.passages
@@ -349,7 +349,7 @@ def signal_name(code: ProgramCode, address: Output, name: str, span: Span | None
 
 
 _HELPERS = {
-    "TARGET": """\
+    "TARGET AT": """\
 FUNC robtarget {name}(pose place,num cf1,num cf4,num cf6,num cfx)
   RETURN [place.trans,place.rot,[cf1,cf4,cf6,cfx],{no_axes}];
 ENDFUNC""",

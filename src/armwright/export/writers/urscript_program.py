@@ -7,7 +7,6 @@ from typing import assert_never
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.cell.outputs import Output
 from armwright.export.refusals import refusal
 from armwright.export.translation.code import (
     Assign,
@@ -40,6 +39,7 @@ from armwright.export.writers.program_text import (
     chunks_of_text,
     flat_index,
     is_whole,
+    number_of,
     program_approximations,
     program_heading,
     scaled,
@@ -266,7 +266,7 @@ class _Writer:
         if one.limit is None:
             yield from (f"while not ({condition}):", "  sync()", "end")
             return
-        waited = self._names("WAITED")
+        waited = self._names("WAITED TIME")
         yield f"{waited} = 0"
         yield f"while not ({condition}) and ({waited} < {self._values.text(one.limit)}):"
         yield from ("  sync()", f"  {waited} = {waited} + get_steptime()", "end")
@@ -336,16 +336,3 @@ def {name}(roll, pitch, yaw):
   turn = rpy2rotvec([roll, pitch, yaw])
   return p[0, 0, 0, turn[0], turn[1], turn[2]]
 end"""
-
-
-def number_of(code: ProgramCode, address: Output, name: str, span: Span | None = None, least: int = 0) -> int:
-    """Return the number of an input or output.
-
-    Raises:
-        ExportError: it has none, or one that the controller does not count.
-    """
-    if address.number is None or address.number < least:
-        text = f"the cell file gives {name} no number from {least} on, and the language knows it by its number"
-        helps = ["write its number as the key `output`, or `input`"]
-        raise refusal(code.source, "E615", text, span or Span(0, 0), "it is used in this program", helps=helps)
-    return address.number
