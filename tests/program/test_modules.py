@@ -320,6 +320,34 @@ def test_number_of_modules_is_bounded() -> None:
     assert said(program) == [("E228", "m19.rlo", 1)]
 
 
+def test_length_of_all_files_is_bounded() -> None:
+    """Files that are allowed one by one may be too long together."""
+    files = {f"m{i}.rlo": f"MODULE m{i} ; {{{' ' * 300_000}}} END." for i in range(4)}
+    imports = " ".join(f'IMPORT "m{i}.rlo" ;' for i in range(4))
+    with raised(program_mb=1):
+        program = compiled(f"{imports}\nBEGIN END.", files)
+
+    assert [one.code for one in program.diagnostics] == ["E228"]
+
+
+def test_cell_of_a_module() -> None:
+    """A cell that only a module imports is that of the program; it is looked for beside the module."""
+    asked: list[str] = []
+    cell = cell_of("cell1")
+
+    def read(path: str) -> ImportedFrames | ImportedModule:
+        asked.append(path)
+        if path == "lib/a.rlo":
+            return ImportedModule(text='MODULE a ; IMPORT "cell.json" ; END.')
+        return ImportedFrames(frames={name: node.parent for name, node in cell.frames.items()}, cell=cell)
+
+    program = translate(Source("main.rlo", 'IMPORT "lib/a.rlo" ;\nBEGIN OPEN ARM_1 ; END.'), read_import=read)
+
+    assert program.diagnostics == ()
+    assert program.cell is not None
+    assert asked == ["lib/a.rlo", "lib/cell.json"]
+
+
 def test_where_modules_cannot_be_whole() -> None:
     """A text without a file, and a session, refuse modules by name."""
     text = 'IMPORT "g.rlo" ;\nBEGIN END.'

@@ -147,6 +147,7 @@ def _as_data(compilation: "Compilation", emit: Stage | None) -> dict[str, Any]:
                 "op": step.op.value,
                 "operands": list(shown_operands(code, step)),
                 "at": [code.line(step), code.source.column(step.span.start)],
+                **({"file": code.source.name_at(step.span.start)} if code.source.file_number(step.span.start) else {}),
                 **({"comment": step.comment} if step.comment else {}),
             }
             for step in code.instructions

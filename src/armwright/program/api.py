@@ -398,6 +398,10 @@ def _check_names(
         linked = LinkedProgram(tree=main.tree, exported=frozenset(exported), diagnostics=check_module(main.tree))
     else:
         linked = link(files, cell_symbols.frames if cell_symbols is not None else ())
+    if files is not None and read_import is not None and cell is None and linked.tree.imports:
+        # Only a module imports a cell.
+        cell = _imported_cell(linked.tree, read_import)
+        cell_symbols = known_cell(cell) if cell is not None else None
     laid_out = lay_out(linked.tree)
     symbols, name_errors, imports = check.check(
         laid_out.tree,

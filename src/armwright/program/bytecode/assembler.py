@@ -13,6 +13,7 @@ from typing import NoReturn
 import attrs
 
 from armwright.errors import FileFormatError, closest, shown
+from armwright.files.limits import limit, limit_message
 from armwright.program.bytecode.instructions import (
     Code,
     Constant,
@@ -167,6 +168,8 @@ class _Reader:
             if not row and self._number == len(self._rows):
                 break
             if row.startswith("module "):
+                if len(paths) > limit("imports"):
+                    self._fail(f"too many modules: {limit_message('imports')}")
                 paths.append(self._string(row.removeprefix("module ").strip()))
                 texts.append([])
                 continue

@@ -160,7 +160,9 @@ class FactTable(Generic[V]):
         value, version = self._entries.get(key) or (self.default, 0)
         if invalidated:
             latest = invalidated.get
-            if version < max(latest(any_element_name(key), 0), latest(EVERYTHING, 0), latest(self.group, 0)):
+            if version < latest(EVERYTHING, 0) or version < latest(self.group, 0):
+                return self.unknown
+            if version < latest(any_element_name(key), 0):
                 return self.unknown
         return value
 

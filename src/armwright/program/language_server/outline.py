@@ -24,6 +24,10 @@ def document_symbols(analysis: Analysis) -> list[DocumentSymbol]:
     for header in analysis.compiled.tree.headers:
         if isinstance(header, tree.Declaration):
             declared += _variable_symbols(codec, header, symbols.types)
+        elif isinstance(header, tree.Record):
+            fields = [symbol for field in header.fields for symbol in _variable_symbols(codec, field, {})]
+            symbol_range, name = span_range(codec, header.span), span_range(codec, header.name.span)
+            declared.append(DocumentSymbol(header.name.text, SymbolKind.Struct, symbol_range, name, children=fields))
         elif isinstance(header, tree.Procedure):
             procedure = symbols.procedures.get(header.name.key)
             types = {} if procedure is None else procedure.types

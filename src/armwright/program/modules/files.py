@@ -5,6 +5,7 @@ from pathlib import PurePosixPath
 import attrs
 
 from armwright.errors import ArmwrightError
+from armwright.files.limits import MEGABYTE, limit, limit_message
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList
 from armwright.program.language.names import is_module
 from armwright.program.language.source import Source
@@ -144,18 +145,27 @@ class _Reader:
             return None
         if path in self.files:
             return path
-        if self._read_import is None:
-            self._refuse(node, "a text without a file has no folder where it could lie")
+        module = self._module_text(node, path)
+        if module is None:
             return None
-        try:
-            brought = self._read_import(path)
-        except ArmwrightError as error:
-            self._refuse(node, str(error))
-            return None
-        assert isinstance(brought, ImportedModule)  # noqa: S101 - its path is that of a module
-        self.source = self.source.with_module(path, brought.text)
+        self.source = self.source.with_module(path, module)
         self.visit(parse_file(self.source, path))
         return path
+
+    def _module_text(self, node: tree.Import, path: str) -> str | None:
+        """Return the text of a module; None where it was reported that there is none."""
+        why = "a text without a file has no folder where it could lie"
+        if self._read_import is not None:
+            try:
+                brought = self._read_import(path)
+                assert isinstance(brought, ImportedModule)  # noqa: S101 - its path is that of a module
+                if len(self.source.text) + len(brought.text) <= limit("program_mb") * MEGABYTE:
+                    return brought.text
+                why = f"all files together are too long: {limit_message('program_mb')}"
+            except ArmwrightError as error:
+                why = str(error)
+        self._refuse(node, why)
+        return None
 
     def _refuse(self, node: tree.Import, note: str) -> None:
         self.has_unknown_names = True

@@ -99,6 +99,9 @@ class _Layout:
             if isinstance(header, tree.Record):
                 self._declare_type(header)
         self._globals = self._variables(program.declarations)
+        constants, procedures = program.constants, program.procedures
+        others = (*(node.name for node in constants), *(node.name for node in procedures))
+        self._report_duplicates(program.declarations, (*(one.name for one in self._types.values()), *others))
         self._procedures = {node.name.key: node for node in program.procedures}
         self._parameters = {key: self._variables(node.parameters) for key, node in self._procedures.items()}
         self._locals: Variables = {}
@@ -156,6 +159,18 @@ class _Layout:
                 found.setdefault(name.key, RecordVariable(name, known, declaration.type.sizes))
         return found
 
+    def _report_duplicates(
+        self, declarations: tuple[tree.Declaration, ...], others: tuple[tree.Name, ...] = ()
+    ) -> None:
+        """Report a name of a record that stands for something else too, as later nobody knows the name."""
+        names = [(name, one.type.record is not None) for one in declarations for name in one.names]
+        records = {name.key for name, is_record in names if is_record} | {one.name.key for one in self._types.values()}
+        first: dict[str, tree.Name] = {}
+        for name in sorted((*others, *(name for name, _ in names)), key=lambda name: name.span):
+            if name.key in records and first.setdefault(name.key, name) is not name:
+                text, here = f"`{name.text}` is declared twice", (Label(first[name.key].span, "first declared here"),)
+                self._report("E203", text, name.span, "again here", secondary=here)
+
     def _header(self, header: tree.Header) -> Iterator[tree.Header]:
         match header:
             case tree.Record():
@@ -170,6 +185,7 @@ class _Layout:
     def _procedure(self, node: tree.Procedure) -> tree.Procedure:
         own = (*node.parameters, *node.declarations)
         self._locals = self._variables(own)
+        self._report_duplicates(own)
         self._all[node.name.key] = self._locals
         self._hidden = frozenset(name.key for declaration in own for name in declaration.names)
         body = attrs.evolve(node.body, statements=tuple(map(self._rewriter, node.body.statements)))
@@ -204,6 +220,8 @@ class _Layout:
             return
         for name in node.names:
             variable = variables[name.key]
+            if variable.name is not name:
+                continue
             for key, kind in variable.type.fields.items():
                 field = _part(name, key, variable)
                 typed = attrs.evolve(kind, sizes=node.type.sizes)

@@ -119,7 +119,8 @@ def _program(tokens: TokenStream) -> tree.Program:
         begun = tokens.previous.key == "BEGIN"
         if begun:
             tokens.note_expected_words(*tokens.vocabulary.statements, "END", starts_statement=True)
-        span = tokens.gap_span() if headers or begun else Span(0, 0)
+        first = tokens.source.file_start(tokens.current.start)
+        span = tokens.gap_span() if headers or begun else Span(first, first)
         text = "the program has no statements" if headers else "there is no program here"
         text, missing = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
         tokens.report("E115", text, span, f"expected `{missing}`")
