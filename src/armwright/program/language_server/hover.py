@@ -120,10 +120,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
             description = text, [_describe_target(analysis, key)]
         case NameKind.UNIT if key in UNITS:
             description = key, [f"a unit of {dimension(key)}"]
-        case NameKind.WATCH | NameKind.TIMER:
-            description = text, [_UNDECLARED[occurrence.kind]]
-        case NameKind.ERROR | NameKind.AXIS:
-            description = text, [_describe_plain(occurrence.kind, key)]
+        case NameKind.WATCH | NameKind.TIMER | NameKind.ERROR | NameKind.AXIS:
+            description = text, [_UNDECLARED.get(occurrence.kind) or _describe_plain(occurrence.kind, key)]
         case NameKind.FUNCTION | NameKind.SENSOR | NameKind.VALUE if (word := word_doc(key)) is not None:
             value = f" : {FUNCTIONS[key].result.name}" if occurrence.kind is NameKind.FUNCTION else ""
             description = word.syntax + value, [word.text]
