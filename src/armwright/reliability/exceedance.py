@@ -17,7 +17,7 @@ from armwright.errors import InvalidValueError, ShapeError
 # Beyond so many standard deviations a coordinate adds nothing that double could represent.
 _TAIL = 40.0
 # Width of a panel in standard deviations, and points of Gauss and Legendre in it.
-_PANEL, _POINTS = 0.5, 16
+_PANEL, _POINTS = 0.5, 10
 # Panels whose logarithm is so far below the largest add nothing.
 _DEPTH = 34.0
 # A standard deviation below this part of the largest is none.
@@ -63,8 +63,7 @@ def _outside(mean: Array, deviations: Array, limit: float) -> float:
     if len(mean) == 1:
         return float(_beyond(mean[0], deviations[0], np.asarray(limit)))
     first, deviation = float(mean[0]), float(deviations[0])
-    turning = [(mean[i] * sign, deviations[i]) for i in range(1, len(mean)) for sign in (1, -1)]
-    edges = _edges(first, deviation, turning, limit)
+    edges = _edges(first, deviation, (float(np.linalg.norm(mean[1:])), *mean[1:]), deviations[1], limit)
     total = float(_beyond(first, deviation, np.asarray(limit)))
     # x = limit sin(u): the limit of what remains is limit cos(u), without a root at the ends.
     half = np.diff(edges) / 2
@@ -75,7 +74,9 @@ def _outside(mean: Array, deviations: Array, limit: float) -> float:
         values = np.exp(log_density) * _beyond(mean[1], deviations[1], rest) * np.cos(u)
     else:
         values = np.zeros_like(x)
-        bound = log_density + np.log(np.maximum(_bound(mean[1:], deviations[1:], rest), 1e-300))
+        # The rest is beyond its limit only if it is so far from its mean, in units of its widest deviation.
+        away = np.maximum(rest - np.linalg.norm(mean[1:]), 0.0) / deviations[-1]
+        bound = log_density - away**2 / 2
         for i, j in np.argwhere(bound > bound.max() - _DEPTH):
             values[i, j] = np.exp(log_density[i, j]) * _outside(mean[1:], deviations[1:], rest[i, j]) * np.cos(u[i, j])
     scale = limit / (deviation * np.sqrt(2 * np.pi))
@@ -88,22 +89,16 @@ def _beyond(mean: Any, deviation: Any, limit: Array) -> Array:
     return np.asarray(0.5 * (erfc((limit - mean) / width) + erfc((limit + mean) / width)))
 
 
-def _bound(mean: Array, deviations: Array, limit: Array) -> Array:
-    """Return what the probability of two coordinates is at most: that one of them is beyond the limit over root two."""
-    each = limit / np.sqrt(2.0)
-    return _beyond(mean[0], deviations[0], each) + _beyond(mean[1], deviations[1], each)
-
-
-def _edges(mean: float, deviation: float, turning: list[tuple[float, float]], limit: float) -> Array:
-    """Return borders of panels in u, over which neither the density nor the rest changes by much."""
+def _edges(mean: float, deviation: float, others: tuple[float, ...], spread: float, limit: float) -> Array:
+    """Return borders of panels in u, over which neither the density nor the probability of the rest changes by much."""
     steps = np.arange(-_TAIL, _TAIL + _PANEL, _PANEL)
     own = (mean + deviation * steps) / limit
     sines = [own[np.abs(own) < 1]]
-    for other, spread in turning:
-        # Where the limit of the rest passes a value of the other coordinate.
-        cosines = (other + spread * steps) / limit
+    for other in others:
+        # Where the limit of the rest passes the mean of a coordinate, or of all together.
+        cosines = (abs(other) + spread * steps) / limit
         cosines = cosines[(cosines > 0) & (cosines < 1)]
         sine = np.sqrt((1 - cosines) * (1 + cosines))
         sines += [sine, -sine]
-    inner = np.arcsin(np.clip(np.concatenate(sines), -1, 1))
+    inner = np.arcsin(np.concatenate(sines))
     return np.unique(np.concatenate([[-np.pi / 2], inner, np.linspace(-1.5, 1.5, 7), [np.pi / 2]]))

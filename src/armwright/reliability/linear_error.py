@@ -15,9 +15,13 @@ from armwright.reliability.first_order import nearest_failure
 
 # Directions along which an error may become too long, in the plane and in space: dense enough that between two of them
 # the density falls by little at the failures of 1e-8.
-_DIRECTIONS = {1: 2, 2: 48, 3: 320}
-# Components of a mixture that are lighter than this part of it are left out; the nominal density has its own part.
-_LIGHT, _NOMINAL = 1e-5, 0.05
+_DIRECTIONS = {1: 2, 2: 32, 3: 128}
+# Part of a mixture that the nominal density has, and part that its lightest components may lack together.
+_NOMINAL, _LIGHT = 0.05, 1e-6
+# A direction in which the error varies by less than this part of the most has no failures.
+_FLAT = 1e-9
+# Components whose centres are nearer to one another, in standard deviations, are one.
+_NEAR = 0.7
 # Numbers of a block of samples.
 _BLOCK = 4_000_000
 
@@ -87,7 +91,7 @@ class LinearError:
         """Return (p,) the probability that the error at each pose is longer than a limit, by the exact law."""
         return np.array([exceedance(m, C, limit) for m, C in zip(self.offset, self.covariance, strict=True)])
 
-    def path_probability(self, limit: float, *, samples: int = 200_000, seed: int = 0) -> Estimate:
+    def path_probability(self, limit: float, *, samples: int = 100_000, seed: int = 0) -> Estimate:
         """Return the probability that the error is longer than a limit at any of the poses, by importance sampling.
 
         Args:
@@ -120,22 +124,45 @@ class LinearError:
         """Return centres (c, k) of normal densities about failures, and their parts (c,); the first one is nominal."""
         directions = _directions(self.offset.shape[1])
         centres, logs = [], []
-        for p, mean in enumerate(self.offset):
-            inverse = np.linalg.pinv(L[p] @ L[p].T, rcond=1e-12, hermitian=True)
-            found = nearest_failure(mean, L[p] @ L[p].T, limit)
-            targets = np.concatenate([limit * directions, found[None]]) - mean
-            z = targets @ inverse @ L[p]
-            # A direction into which the deviations cannot push is no failure.
-            reached = np.abs(z @ L[p].T - targets).max(axis=-1) < 1e-6 * limit
-            centres.append(z[reached])
-            logs.append(-0.5 * (z[reached] ** 2).sum(axis=-1))
+        for mean, each in zip(self.offset, L, strict=True):
+            if np.linalg.norm(mean) >= limit:
+                continue  # it fails as it is: the nominal density finds the failures
+            # Along the axes of the deviations all directions are equally probable, and of those to the nearest failure
+            # and away from it one is the most probable.
+            axes, sizes, across = np.linalg.svd(each, full_matrices=False)
+            varies = sizes > _FLAT * max(float(sizes[0]), np.finfo(float).tiny)
+            if not varies.any():
+                continue
+            nearest = (nearest_failure(mean, each @ each.T, limit) - mean) @ axes[:, varies] / sizes[varies]
+            ways = np.concatenate([directions[:, varies], nearest[None], -nearest[None]])
+            ways = ways[np.linalg.norm(ways, axis=1) > 0]
+            ways /= np.linalg.norm(ways, axis=1)[:, None]
+            steps = ways * sizes[varies] @ axes[:, varies].T
+            a, b = (steps**2).sum(axis=1), steps @ mean
+            distance = (np.sqrt(b**2 + a * (limit**2 - mean @ mean)) - b) / a
+            centres.append(distance[:, None] * ways @ across[varies])
+            logs.append(-0.5 * distance**2)
+        if not centres:
+            return np.zeros((1, L.shape[-1])), np.ones(1)
         z, log = np.concatenate(centres), np.concatenate(logs)
-        parts = np.exp(log - log.max()) if len(log) else log
-        kept = parts > _LIGHT * parts.sum()
-        z, parts = z[kept], parts[kept]
-        parts = parts / parts.sum() * (1 - _NOMINAL) if len(parts) else parts
-        nominal = np.zeros((1, L.shape[-1]))
-        return np.concatenate([nominal, z]), np.concatenate([[1 - parts.sum()], parts])
+        heaviest = np.argsort(-log)
+        weights = np.exp(log[heaviest] - log.max())
+        heaviest = heaviest[np.cumsum(weights) - weights <= (1 - _LIGHT) * weights.sum()]
+        kept, parts = _merged(z[heaviest], weights[: len(heaviest)])
+        parts *= (1 - _NOMINAL) / parts.sum()
+        return np.concatenate([np.zeros((1, L.shape[-1])), kept]), np.concatenate([[_NOMINAL], parts])
+
+
+def _merged(centres: Array, weights: Array) -> tuple[Array, Array]:
+    """Return centres that are not near each other, and their weights with those of the centres near them."""
+    left = np.arange(len(centres))
+    kept, sums = [], []
+    while len(left):
+        near = np.square(centres[left] - centres[left[0]]).sum(axis=-1) < _NEAR**2
+        kept.append(centres[left[0]])
+        sums.append(weights[left[near]].sum())
+        left = left[~near]
+    return np.array(kept), np.array(sums)
 
 
 def fosm(mean: Array, covariance: Array, limit: float) -> float:
