@@ -18,6 +18,8 @@ Rule: TypeAlias = Literal["worst-case", "statistical"]
 
 # Tolerances change by at most this factor to either side.
 _RANGE = 1e6
+# A dimension that moves the tool by less than this part of what the first one does, moves it by rounding only.
+_IDLE = 1e-12
 # The cost is above the least by at most this part, or as found within so many rounds.
 _GAP, _ROUNDS = 1e-8, 100
 _PRECISION, _STEPS = 1e-14, 1000
@@ -87,12 +89,13 @@ def allocate(tolerances: Sequence[Tolerance], error: LinearError, limit: float, 
     limit = positive(limit, "limit")
     if error.offset.any():
         raise InvalidValueError("error: expected a mean of zero, got an offset")
-    moving = np.abs(error.jacobian).max(axis=(0, 1)) > 0
-    if not moving.any():
-        raise InvalidValueError("error: no deviation moves the tool, so that no tolerance has a bound")
     given, cost, exponent = (
         np.array([getattr(each, name) for each in tolerances]) for name in ("half_width", "cost", "exponent")
     )
+    moves = np.abs(error.jacobian * given).max(axis=(0, 1))
+    moving = moves > _IDLE * moves.max()
+    if not moving.any():
+        raise InvalidValueError("error: no deviation moves the tool, so that no tolerance has a bound")
     widths = np.where(moving, given, 0.0)
     start = given * limit / error_bounds(error, widths, rule)[0].max()
     start_costs = np.where(moving, cost * (given / start) ** exponent, 0.0)
