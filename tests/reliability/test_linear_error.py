@@ -95,8 +95,10 @@ def test_shares(rng: np.random.Generator) -> None:
     """Shares add up to one, and those of a deviation that is doubled grow fourfold against the others."""
     error = random_error(rng, poses=3)
     wider = LinearError(
-        names=error.names, deviations=error.deviations * np.where(np.arange(len(error.names)) == 0, 2, 1),
-        offset=error.offset, jacobian=error.jacobian,
+        names=error.names,
+        deviations=error.deviations * np.where(np.arange(len(error.names)) == 0, 2, 1),
+        offset=error.offset,
+        jacobian=error.jacobian,
     )
     np.testing.assert_allclose(error.shares.sum(axis=1), 1)
     ratio = wider.shares[:, 0] / (1 - wider.shares[:, 0]) / (error.shares[:, 0] / (1 - error.shares[:, 0]))

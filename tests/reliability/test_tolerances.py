@@ -150,9 +150,7 @@ def test_least_cost_of_one_direction(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(worst.half_widths, expected * limit / (a @ expected), rtol=1e-4)
     assert worst.costs.sum() == pytest.approx(np.sqrt(a * cost).sum() ** 2 / limit, rel=1e-7)
     expected = np.cbrt(cost / a**2)
-    np.testing.assert_allclose(
-        statistical.half_widths, expected * limit / np.sqrt(a**2 @ expected**2), rtol=1e-4
-    )
+    np.testing.assert_allclose(statistical.half_widths, expected * limit / np.sqrt(a**2 @ expected**2), rtol=1e-4)
 
 
 @pytest.mark.parametrize("rule", ["worst-case", "statistical"])

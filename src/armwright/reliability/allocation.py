@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from armwright.arrays import Array, positive
 from armwright.errors import InvalidValueError
 from armwright.reliability.linear_error import LinearError
-from armwright.reliability.tolerances import SIGMAS, Tolerance
+from armwright.reliability.tolerances import Tolerance
 from armwright.reliability.worst_case import longest_sum
 
 Rule: TypeAlias = Literal["worst-case", "statistical"]
@@ -145,7 +145,10 @@ def _cheapest(cost: Array, exponent: Array, planes: Array, power: int, logs: Arr
     # From within: the last solution, shortened until it is within the new planes too.
     shortest = float(slack(logs).min()) / power
     found = minimize(
-        objective, logs + min(shortest, 0.0), jac=True, method="SLSQP",
+        objective,
+        logs + min(shortest, 0.0),
+        jac=True,
+        method="SLSQP",
         bounds=[(-np.log(_RANGE), np.log(_RANGE))] * len(logs),
         constraints=[{"type": "ineq", "fun": slack, "jac": slack_slopes}],
         options={"ftol": _PRECISION, "maxiter": _STEPS},

@@ -18,11 +18,12 @@ from armwright.reliability.arm_errors import sampled_errors, tool_error
 from armwright.reliability.linear_error import Estimate, LinearError
 from armwright.reliability.tolerances import Tolerance
 
-# Shares of the variance below this part are summed up in one row.
-_SMALL_SHARE = 0.01
 # The linear law is said to be off where its longest errors differ by more from those of the full kinematics.
 _LINEAR = 0.01
-_MOST_POSES = 2000
+_MEANING = (
+    "Tolerances are half widths. Worst case: all dimensions are at the ends of their tolerances. Statistical: "
+    "deviations are normal and independent, and a tolerance is three standard deviations."
+)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -77,10 +78,7 @@ class ToleranceAssessment:
     def notes(self) -> tuple[str, ...]:
         """What a reader must know beside the numbers."""
         spread = 4 / np.sqrt(len(self.sampled))
-        notes = [
-            "Tolerances are ± half widths. Worst case: all dimensions are at the ends of their tolerances. Statistical: "
-            "deviations are normal and independent, a tolerance is three standard deviations."
-        ]
+        notes = [_MEANING]
         if self.nonlinearity > _LINEAR + spread:
             notes.append(
                 f"The errors of the full kinematics differ by {self.nonlinearity:.1%} from the linear law: trust the "
@@ -178,8 +176,8 @@ class ToleranceAssessment:
         if allocation is not None and self.limit is not None:
             saved = allocation.scaled_cost / allocation.costs.sum() - 1
             remark = (
-                f"Least cost for {self.limit * 1e3:g} mm by the {self.rule} rule: {allocation.costs.sum():.4g}; the given "
-                f"tolerances, all scaled to the same limit, cost {allocation.scaled_cost:.4g}: {saved:.1%} more."
+                f"Least cost for {self.limit * 1e3:g} mm by the {self.rule} rule: {allocation.costs.sum():.4g}; the "
+                f"given tolerances, all scaled to the same limit, cost {allocation.scaled_cost:.4g}: {saved:.1%} more."
             )
         return ResultTable(
             title=f"Dimensions, by their share of the variance at pose {self.worst_pose + 1}",

@@ -43,7 +43,9 @@ def exceedance(mean: ArrayLike, covariance: ArrayLike, limit: float) -> float:
     """
     m, C = floats(mean, "mean"), floats(covariance, "covariance")
     if m.ndim != 1 or len(m) not in _DIMENSIONS or C.shape != (len(m), len(m)):
-        raise ShapeError(f"mean and covariance: expected (d,) and (d, d) with d from 1 to 3, got {m.shape} and {C.shape}")
+        raise ShapeError(
+            f"mean and covariance: expected (d,) and (d, d) with d from 1 to 3, got {m.shape} and {C.shape}"
+        )
     largest = positive(limit, "limit")
     variances, axes = np.linalg.eigh((C + C.T) / 2)
     if not np.allclose(C, C.T, rtol=1e-9, atol=0) or variances[0] < -_FLAT * max(abs(variances).max(), 1e-300):
@@ -80,7 +82,7 @@ def _outside(mean: Array, deviations: Array, limit: float) -> float:
         for i, j in np.argwhere(bound > bound.max() - _DEPTH):
             values[i, j] = np.exp(log_density[i, j]) * _outside(mean[1:], deviations[1:], rest[i, j]) * np.cos(u[i, j])
     scale = limit / (deviation * np.sqrt(2 * np.pi))
-    return min(total + scale * float((values * _WEIGHTS * half[:, None]).sum()), 1.0)
+    return float(min(total + scale * float((values * _WEIGHTS * half[:, None]).sum()), 1.0))
 
 
 def _beyond(mean: Any, deviation: Any, limit: Array) -> Array:

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from scipy.special import ndtr
 
-from armwright.arrays import Array, floats, integer, positive
+from armwright.arrays import Array, ArrayLike, integer, positive, read_only
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.reliability.exceedance import exceedance
 from armwright.reliability.first_order import nearest_failure
@@ -40,6 +40,10 @@ class Estimate(NamedTuple):
     samples: int
 
 
+def _array(value: ArrayLike) -> Array:
+    return read_only(np.array(value, dtype=np.float64))
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class LinearError:
     """Errors e_p = m_p + J_p x of poses p, of independent normal deviations x.
@@ -52,9 +56,9 @@ class LinearError:
     """
 
     names: tuple[str, ...]
-    deviations: Array = attrs.field(converter=lambda x: floats(x, "deviations"))
-    offset: Array = attrs.field(converter=lambda x: floats(x, "offset"))
-    jacobian: Array = attrs.field(converter=lambda x: floats(x, "jacobian"))
+    deviations: Array = attrs.field(converter=_array)
+    offset: Array = attrs.field(converter=_array)
+    jacobian: Array = attrs.field(converter=_array)
 
     def __attrs_post_init__(self) -> None:
         """Refuse arrays that do not fit each other."""
@@ -67,6 +71,8 @@ class LinearError:
             )
         if dimensions not in _DIRECTIONS:
             raise ShapeError(f"offset: expected errors of 1 to 3 coordinates, got {dimensions}")
+        if not all(np.isfinite(x).all() for x in (self.deviations, self.offset, self.jacobian)):
+            raise InvalidValueError("expected finite numbers in deviations, offset and jacobian")
         if (self.deviations < 0).any():
             raise InvalidValueError(f"deviations: expected none below zero, got {self.deviations.min():g}")
 

@@ -86,9 +86,7 @@ def read_tolerances(path: Path | str, arm: Arm) -> tuple[Tolerance, ...]:
         if name not in known:
             raise root.table("cost").table("factors").error(name, f"{arm.name} has no such dimension")
     found = tuple(
-        Tolerance(
-            name=name, half_width=values[name], is_length=length, cost=factors.get(name, 1.0), exponent=exponent
-        )
+        Tolerance(name=name, half_width=values[name], is_length=length, cost=factors.get(name, 1.0), exponent=exponent)
         for name, length in known.items()
         if values.get(name, 0.0) > 0
     )
@@ -116,7 +114,7 @@ def _dimension_values(table: Table, keys: Iterator[tuple[str, str, float]]) -> d
 def _end_values(table: Table) -> dict[str, float]:
     position, rotation = (table.number(key, 0.0, lower=0.0) for key in ("position_mm", "rotation_deg"))
     table.refuse_unknown_keys()
-    lengths = {axis: position * 1e-3 for axis in "xyz"}
+    lengths = dict.fromkeys("xyz", position * 0.001)
     return {**lengths, **{f"r{axis}": math.radians(rotation) for axis in "xyz"}}
 
 

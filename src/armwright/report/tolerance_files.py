@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armwright.reliability.allocation import Allocation
 from armwright.reliability.assessment import ToleranceAssessment
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
@@ -76,7 +77,7 @@ def _drawings(assessment: ToleranceAssessment) -> Iterator[Drawing]:
         yield Drawing(
             "costs",
             "tolerances of least cost: how many times wider than given; those right of 1 can be relaxed",
-            _changes(assessment),
+            _changes(assessment, assessment.allocation),
         )
 
 
@@ -108,9 +109,8 @@ def _shares(assessment: ToleranceAssessment) -> str:
     return svg_text(figure, "Shares of the dimensions")
 
 
-def _changes(assessment: ToleranceAssessment) -> str:
-    assert assessment.allocation is not None
-    widths = assessment.allocation.half_widths
+def _changes(assessment: ToleranceAssessment, allocation: Allocation) -> str:
+    widths = allocation.half_widths
     order = [i for i in assessment.ranking if np.isfinite(widths[i])][:_BARS]
     figure = empty_figure((7.4, 0.9 + 0.24 * len(order)))
     axes = plain_axes(figure, "tolerance of least cost / given tolerance", "")
