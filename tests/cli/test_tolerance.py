@@ -14,14 +14,14 @@ Q_DEG = "10,-20,30,0,40,0"
 
 
 def test_of_one_pose() -> None:
-    """Worst case, statistical error and probability of a pose; shares add up to one, the limit is kept by least cost."""
+    """A pose has a worst case, a statistical error and a probability; shares add up to one, least cost keeps the limit."""
     done = armwright(
         "tolerance", "puma560", TOLERANCES, "-q", Q_DEG, "--limit", "0.2", "--allocate", "worst-case", "--json"
     )
     data = json.loads(done.stdout)
 
     (pose,) = data["poses"]
-    assert 3 * pose["statistical_m"] > pose["worst_case_m"] > pose["statistical_m"] > 0
+    assert pose["worst_case_m"] > pose["statistical_m"] > 0
     assert sum(one["share"] for one in data["dimensions"]) == pytest.approx(1)
     assert pose["probability"] == pytest.approx(data["on_path"]["probability"], rel=0.1)
     assert data["allocation"]["least_cost"] <= data["allocation"]["cost"] <= data["allocation"]["scaled_cost"]
