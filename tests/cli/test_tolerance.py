@@ -14,7 +14,7 @@ Q_DEG = "10,-20,30,0,40,0"
 
 
 def test_of_one_pose() -> None:
-    """A pose has a worst case, a statistical error and a probability; shares add up to one, least cost keeps the limit."""
+    """A pose has a worst case, a statistical error, a probability; shares add up to one; least cost keeps the limit."""
     done = armwright(
         "tolerance", "puma560", TOLERANCES, "-q", Q_DEG, "--limit", "0.2", "--allocate", "worst-case", "--json"
     )
