@@ -12,6 +12,7 @@ from . import (
     motion as motion,
     physics as physics,
     program as program,
+    reliability as reliability,
     simulation as simulation,
     spatial as spatial,
     studio as studio,

@@ -1,0 +1,26 @@
+from .allocation import Allocation as Allocation, allocate as allocate, error_bounds as error_bounds
+from .arm_errors import sampled_errors as sampled_errors, tool_error as tool_error
+from .assessment import ToleranceAssessment as ToleranceAssessment, assess_tolerances as assess_tolerances
+from .exceedance import exceedance as exceedance
+from .first_order import (
+    form as form,
+    nearest_failure as nearest_failure,
+    reliability_index as reliability_index,
+)
+from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
+from .play_life import (
+    PlayLife as PlayLife,
+    WearRates as WearRates,
+    play_life as play_life,
+    repeatability_factors as repeatability_factors,
+)
+from .reducer_life import (
+    Load as Load,
+    Rating as Rating,
+    joint_speed as joint_speed,
+    life_hours as life_hours,
+    load_of as load_of,
+)
+from .tolerances import Tolerance as Tolerance, dimensions as dimensions, read_tolerances as read_tolerances
+from .wear_update import RatePosterior as RatePosterior, updated_rate as updated_rate
+from .worst_case import longest_sum as longest_sum

@@ -1,0 +1,189 @@
+"""Tolerances of arms: worst case, least cost, and the full kinematics."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from armwright.arm.load import load_arm
+from armwright.arm.positions import ranges
+from armwright.errors import FileFormatError, InvalidValueError
+from armwright.reliability.allocation import allocate, error_bounds
+from armwright.reliability.arm_errors import sampled_errors, tool_error
+from armwright.reliability.linear_error import LinearError
+from armwright.reliability.tolerances import Tolerance, dimensions, read_tolerances
+from armwright.reliability.worst_case import longest_sum
+from samples import Sample
+
+PUMA = load_arm("puma560")
+TOLERANCES = """
+[joints]
+theta_deg = 0.01
+d_mm = 0.05
+[joint.2]
+theta_deg = 0.02
+alpha_deg = 0.03
+[tool]
+position_mm = 0.1
+"""
+
+
+@pytest.fixture
+def tolerances(tmp_path: Path) -> tuple[Tolerance, ...]:
+    """Those of the file above."""
+    (tmp_path / "tolerances.toml").write_text(TOLERANCES, encoding="utf-8")
+    return read_tolerances(tmp_path / "tolerances.toml", PUMA)
+
+
+def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Random configurations of the Puma."""
+    return rng.uniform(*ranges(PUMA), size=(count, 6))
+
+
+def named(widths: np.ndarray, cost: float = 1.0, exponent: float = 1.0) -> list[Tolerance]:
+    """Tolerances of lengths."""
+    return [
+        Tolerance(name=f"x{i}", half_width=width, is_length=True, cost=cost, exponent=exponent)
+        for i, width in enumerate(widths)
+    ]
+
+
+def unit_error(jacobian: np.ndarray) -> LinearError:
+    """An error without a mean; its deviations do not matter."""
+    poses, d, k = jacobian.shape
+    names = tuple(f"x{i}" for i in range(k))
+    return LinearError(names=names, deviations=np.ones(k), offset=np.zeros((poses, d)), jacobian=jacobian)
+
+
+def test_file(tolerances: tuple[Tolerance, ...]) -> None:
+    """A joint's own values replace those of all joints; parallel axes have the tilt of the twist."""
+    found = {each.name: each.half_width for each in tolerances}
+    assert found["joint1.theta"] == pytest.approx(np.radians(0.01))
+    assert found["joint2.theta"] == pytest.approx(np.radians(0.02))
+    assert found["joint2.alpha"] == found["joint2.beta"] == pytest.approx(np.radians(0.03))
+    assert found["joint2.d"] == pytest.approx(5e-5)
+    assert found["tool.y"] == pytest.approx(1e-4)
+    assert set(found) == {f"joint{i}.{name}" for i in range(1, 7) for name in ("theta", "d")} | {
+        "joint2.alpha", "joint2.beta", "tool.x", "tool.y", "tool.z",
+    }  # fmt: skip
+    assert set(found) < set(dimensions(PUMA))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "expected a tolerance above zero"),
+        ("[joints]\ntheta_deg = -1", "expected 0 or more"),
+        ("[joints]\ntheta_dg = 1", "did you mean 'theta_deg'"),
+        ("[joint.7]\ntheta_deg = 1", "unknown key"),
+        ("[joint.2]\ntheta_deg = nan", "finite"),
+        ("[tool]\nposition_mm = 1\n[cost.factors]\n'joint9.d' = 2", "no such dimension"),
+        ("[tool]\nposition_mm = 1\n[cost]\nexponent = 0", "above 0"),
+        ("joints = 3", "expected a table"),
+    ],
+)
+def test_bad_files(text: str, said: str, tmp_path: Path) -> None:
+    """What a file has wrong is said."""
+    (tmp_path / "t.toml").write_text(text, encoding="utf-8")
+    with pytest.raises((FileFormatError, InvalidValueError), match=said):
+        read_tolerances(tmp_path / "t.toml", PUMA)
+
+
+@pytest.mark.proof
+@pytest.mark.share(0.05)
+def test_longest_sum(sample: Sample) -> None:
+    """It is the longest of all sums with factors of one either way, parallel and coplanar generators included."""
+    for rng in sample.cases(1000):
+        d, k = int(rng.integers(1, 4)), int(rng.integers(1, 10))
+        G = rng.normal(size=(d, k)) * 10 ** rng.uniform(-5, 5)
+        if rng.random() < 0.5:
+            G[:, rng.integers(k)] = G[:, 0] * rng.normal()
+        if rng.random() < 0.3:
+            G[:, rng.integers(k)] = 0
+        if rng.random() < 0.3:
+            G[d - 1] = 0
+        if rng.random() < 0.4 and k > 4:
+            G[:, 2], G[:, 3], G[:, 4] = G[:, 0] + G[:, 1], G[:, 0] - 2 * G[:, 1], G[:, 1] - 3 * G[:, 0]
+        offset = rng.normal(size=d) * abs(G).max() if rng.random() < 0.5 else None
+        start = np.zeros(d) if offset is None else offset
+        signs = np.array(list(itertools.product((-1, 1), repeat=k)))
+        expected = np.linalg.norm(start + signs @ G.T, axis=1).max()
+
+        length, factors = longest_sum(G, offset)
+
+        assert length == pytest.approx(expected, rel=1e-9, abs=1e-300)
+        assert np.linalg.norm(start + G @ factors) == pytest.approx(length, rel=1e-12, abs=1e-300)
+        assert set(factors) <= {-1, 1}
+    sample.record("longest sums", sample.count(1000), 0)
+
+
+def test_tool_error_is_linear(tolerances: tuple[Tolerance, ...], rng: np.random.Generator) -> None:
+    """The longest error of a path is that of the full kinematics within a hundredth, for the same random arms."""
+    q = configurations(rng, 15)
+    error = tool_error(PUMA, q, tolerances)
+    full = sampled_errors(PUMA, q, tolerances, samples=300, seed=5).max(axis=1)
+    z = np.random.default_rng(5).normal(scale=1 / 3, size=(300, len(tolerances)))
+    widths = np.array([each.half_width for each in tolerances])
+    linear = np.linalg.norm(np.einsum("pdk,mk->mpd", error.jacobian, z * widths), axis=-1).max(axis=1)
+
+    np.testing.assert_allclose(linear, full, rtol=1e-2)
+    bound, _ = error_bounds(error, widths, "worst-case")
+    uniform = sampled_errors(PUMA, q, tolerances, samples=300, seed=6, uniform=True)
+    assert (uniform <= bound * 1.001).all()
+
+
+def test_least_cost_of_one_direction(rng: np.random.Generator) -> None:
+    """In one dimension at one pose the least cost has a closed form."""
+    a, cost, limit = rng.uniform(0.1, 3, 6), rng.uniform(0.5, 4, 6), 0.7
+    tolerances = [
+        Tolerance(name=f"x{i}", half_width=1.0, is_length=True, cost=c, exponent=1.0) for i, c in enumerate(cost)
+    ]
+    error = unit_error(a[None, None])
+
+    worst = allocate(tolerances, error, limit, "worst-case")
+    statistical = allocate(tolerances, error, limit, "statistical")
+
+    # Lagrange: t is in proportion to sqrt(cost / a), and to (cost / a²)^(1/3).
+    expected = np.sqrt(cost / a)
+    np.testing.assert_allclose(worst.half_widths, expected * limit / (a @ expected), rtol=1e-4)
+    assert worst.costs.sum() == pytest.approx(np.sqrt(a * cost).sum() ** 2 / limit, rel=1e-7)
+    expected = np.cbrt(cost / a**2)
+    np.testing.assert_allclose(statistical.half_widths, expected * limit / np.sqrt(a**2 @ expected**2), rtol=1e-4)
+
+
+@pytest.mark.parametrize("rule", ["worst-case", "statistical"])
+def test_least_cost_on_a_path(rule: str, rng: np.random.Generator) -> None:
+    """The limit is kept at every pose, no other tolerances found cost less, and the lower bound is met."""
+    jacobian = rng.normal(size=(4, int(rng.integers(2, 4)), 5))
+    tolerances, error, limit = named(rng.uniform(0.1, 2, 5), exponent=rng.uniform(0.5, 2)), unit_error(jacobian), 0.3
+
+    found = allocate(tolerances, error, limit, rule)
+
+    bounds, _ = error_bounds(error, found.half_widths, rule)
+    assert bounds.max() == pytest.approx(limit, rel=1e-6)
+    assert bounds.max() <= limit * (1 + 1e-9)
+    assert found.least_cost <= found.costs.sum() * (1 + 1e-9)
+    assert found.costs.sum() <= found.least_cost * (1 + 1e-6)
+    assert found.costs.sum() <= found.scaled_cost * (1 + 1e-9)
+    given, exponent = np.array([each.half_width for each in tolerances]), tolerances[0].exponent
+
+    def cost(logs: np.ndarray) -> float:
+        widths = given * np.exp(logs)
+        widths *= limit / error_bounds(error, widths, rule)[0].max()
+        return float(((given / widths) ** exponent).sum())
+
+    start = np.log(found.half_widths / given)
+    other = minimize(cost, start + rng.normal(scale=0.3, size=5), method="Nelder-Mead", options={"maxiter": 1500})
+    assert other.fun >= found.costs.sum() * (1 - 1e-6)
+
+
+def test_idle_dimensions_are_free() -> None:
+    """A dimension that moves the tool at no pose needs no tolerance; if none moves it, nothing can be allocated."""
+    jacobian = np.array([[[1.0, 0.0]]])
+    found = allocate(named(np.ones(2)), unit_error(jacobian), 0.5, "worst-case")
+    np.testing.assert_allclose(found.half_widths, [0.5, np.inf])
+    assert found.costs[1] == 0
+    with pytest.raises(InvalidValueError, match="no deviation moves the tool"):
+        allocate(named(np.ones(2)), unit_error(jacobian * 0), 0.5, "worst-case")
