@@ -19,7 +19,7 @@ COMMANDS = {
     "fmt": "Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.",
     "fix": "Correct the mistakes in RLO programs that have a certain correction, such as a missing `;` or `=`.",
     "lsp": "Serve an editor by the Language Server Protocol, over standard input and output.",
-    "export": "Run an RLO program in a simulated cell, and write its motion for a real controller, with its proof.",
+    "export": "Run an RLO program in a simulated cell, and write it, or its motion, for a real controller, with its proof.",
     "code": "Print the intermediate code of a program, or write it to a file that can be edited and run.",
     "arms": "List the arms of the catalogue.",
     "show": "Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.",
