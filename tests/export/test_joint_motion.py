@@ -84,5 +84,5 @@ def test_says_what_is_not_known(plan: Excitation) -> None:
     with pytest.raises(ExportError, match="E618: the cell file does not say how the drives of ARM_1 count"):
         export_motion("csv", plan.trajectory, _placed(plan), "excitation")
     unknown = attrs.evolve(_placed(plan), arm=attrs.evolve(plan.model.arm, name="mine"))
-    with pytest.raises(ExportError, match="E614: no convention"):
+    with pytest.raises(ExportError, match="E614: no source that was read says how the controller of 'mine'"):
         export_motion("urscript", plan.trajectory, unknown, "excitation")

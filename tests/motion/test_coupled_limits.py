@@ -170,7 +170,7 @@ def test_stops(sample: Sample) -> None:
         most = float(rng.uniform(0.5, 2.0))
         arm = with_drives(Limits(acceleration=most))
         motion = point_to_point(arm, START, goal, speed=120)
-        stop = braked(arm, motion, float(rng.uniform(0.2, 0.8)) * motion.duration, period=1e-3)
+        stop = braked(arm, motion, float(rng.uniform(0.2, 0.8)) * motion.duration, period=1e-3).trajectory
 
         assert stop.coefficients.shape[2] == 6
         assert np.abs(elbow(stop, 2)).max() < most * (1 + SEEN)
