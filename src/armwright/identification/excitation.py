@@ -142,6 +142,8 @@ class Excitation:
         if known.any():
             part = float(np.median(self.errors[known] / self.sizes[known]))
             told = f"; half of those of the drawing are known to {part:.1%} or better"
+            if part >= 1:
+                told = "; half of those of the drawing, or more, would not be known: move for longer or faster"
         count, each = len(self.sizes), f"{self.rate:g} independent readings a second"
         return (
             f"condition {self.condition:.1f} of {count} base columns, not rescaled, by {self.evaluations} evaluations",
