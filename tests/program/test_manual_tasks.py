@@ -1,4 +1,4 @@
-"""Twenty tasks from manuals of other robot languages (docs/manual-tasks.md), as programs of RLO that do what they must."""
+"""Twenty tasks from manuals of other robot languages (docs/manual-tasks.md), as programs that do them."""
 
 import re
 from functools import cache
