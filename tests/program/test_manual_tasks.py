@@ -217,6 +217,7 @@ def test_height_and_tilt() -> None:
     height = float(lines[0].removeprefix("height "))
     tilt = [float(word) for word in lines[1].split()[1:]]
     np.testing.assert_allclose(tilt, [0, 3], atol=0.01)
+    assert float(lines[2].removeprefix("not flat by ")) < 0.01
     angle = np.radians(3)
     assert height == pytest.approx(50 + 10 / np.cos(angle) + 15 * np.tan(angle) - 0.3, abs=0.05)
 
