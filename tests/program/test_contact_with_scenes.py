@@ -63,6 +63,26 @@ def tool_at_end(cell: Cell, recording: Recording) -> Array:
     return np.asarray(arm.base @ forward(arm.arm, recording.streams[0].q[-1]))
 
 
+def test_search_that_begins_beside_a_part(tmp_path: Path) -> None:
+    """A guarded MOVE may meet the part at which the MOVE before it ended, also where its own end is far from it."""
+    cell = bare(tmp_path, "puma560", ("force_N = 30", 'kind = "suction", force_N = 30'))
+    x, y, z = cell.parts["BLOCK"].pose[:3, 3]
+    recording = interpret(
+        compiled(
+            cell,
+            "VAR up, low : FRAME ;\nBEGIN\n"
+            f"  up = (1,0,0, 0,-1,0, 0,0,-1, {x:.6f},{y:.6f},{z + 0.03:.6f}) ; low = up * XYZ(0, 0, 0.073) ;\n"
+            "  MOVE ARM_1 TO up ;\n"
+            "  MOVE ARM_1 TO low STRAIGHTLY, WITH SPEED = 10, ON FORCE(Z) > 8 DO HALT ;\nEND.\n",
+        ).code,
+        cell,
+        kinematic_cell(cell),
+    )
+
+    # Half a block above its centre.
+    assert 0 < z + 0.02 - tool_at_end(cell, recording)[2, 3] < 2e-3
+
+
 @pytest.mark.parametrize("arm", ["stanford", "puma560"])
 def test_down_on_the_table(arm: str, sample: Sample, tmp_path: Path) -> None:
     """Fingers that come down on a table are pushed up with stiffness times depth; the guard acts at the first tick."""

@@ -103,3 +103,10 @@ def test_deadlock_is_not_recovered() -> None:
     END."""
 
     assert failure(text).diagnostic.code == "E501"
+
+
+def test_a_kind_that_nothing_raises_is_corrected_as_the_program_spells_it() -> None:
+    """The suggestion for a kind is a word of the program, not its key."""
+    compiled = translate(Source("t.rlo", "BEGIN TRY RAISE clampy RECOVER (clampi) PRINT(MESSAGE) END END."))
+
+    assert [(one.code, one.helps) for one in compiled.diagnostics] == [("E236", ("did you mean `clampy`?",))]

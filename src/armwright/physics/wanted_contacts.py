@@ -96,13 +96,11 @@ class WantedContacts:
             self._rests[number] = role.part is not None and body.arm is None
             holds = role.in_hand or role.part is not None
             met_by = beside.get(str(facing.arm), frozenset()) if facing.grips else frozenset()
-            if role.grips and facing.part in beside.get(move.arm, ()) and facing.part != move.goal_part:
+            if holds and move.on_force:
+                self._free_until[number] = np.inf
+            elif role.grips and facing.part in beside.get(move.arm, ()) and facing.part != move.goal_part:
                 until_clear.setdefault(str(facing.part), []).append(number)
-            elif (
-                (role.grips and facing.part is not None and facing.part == move.goal_part)
-                or role.part in met_by
-                or (holds and move.on_force)
-            ):
+            elif (role.grips and facing.part is not None and facing.part == move.goal_part) or role.part in met_by:
                 self._free_until[number] = np.inf
             elif holds and move.after_force:
                 until_clear.setdefault(f"{other}", []).append(number)

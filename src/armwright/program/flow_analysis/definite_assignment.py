@@ -92,7 +92,7 @@ def _require_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
     if not is_frame:
         value = "( twelve numbers )" if kind is None else _EXAMPLES.get(kind.kind, "( twelve numbers )")
         code, advice = "E303", f"write `{text} = {value} ;` before"
-    elif state.cell is None and slot == key and isinstance(node, tree.Name):
+    elif state.cell is None and state.symbols.scope(None).type(slot) is not None and isinstance(node, tree.Name):
         # A cell file may give a value to the frames of the program, and to no others.
         code, note = "W204", "no cell was given; a cell file may give it one"
     elif state.table.is_empty:

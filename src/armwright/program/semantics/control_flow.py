@@ -182,7 +182,7 @@ def raise_(context: Context, node: tree.Raise) -> None:
         text, note = f"`{kind.text}` is a kind of errors of the language", f"it stands for: {KINDS[kind.key]}"
         advice = "give the errors of the program a name of their own"
         names.report("E236", text, kind.span, "not a kind of its own", note=note, advice=advice)
-    names.raised.add(kind.key)
+    names.raised.setdefault(kind.key, kind.text)
     if node.text is not None:
         require_type(names, node.text, ExpressionType.TEXT, "E217", "RAISE ... WITH needs a text")
 
@@ -191,7 +191,7 @@ def report_unknown_kinds(names: NameResolver) -> None:
     """Report kinds of errors that a RECOVER names and that nothing can be."""
     for kind in names.recovered:
         if kind.key not in KINDS and kind.key not in names.raised:
-            near = names.closest_name(kind.text, lambda: [*KINDS, *names.raised])
+            near = names.closest_name(kind.text, lambda: [*KINDS, *names.raised.values()])
             advice = did_you_mean(near) or f"write `RAISE {kind.text}` where it occurs"
             note = f"kinds of the language are {', '.join(KINDS)}"
             text = f"no error is of the kind `{kind.text}`"

@@ -29,8 +29,8 @@ class NameResolver:
         self.symbols = Symbols(types=dict(PREDECLARED), std=std)
         self.imports: list[ImportedFrames] = []
         self.cell = cell
-        # The kinds of errors that the program raises, and those that its RECOVERs name.
-        self.raised: set[str] = set()
+        # The kinds of errors that the program raises, as it first spells them, and those that its RECOVERs name.
+        self.raised: dict[str, str] = {}
         self.recovered: list[tree.Name] = []
         # The timers that the program starts or sets, and where it reads one.
         self.timers: set[str] = set()

@@ -424,6 +424,11 @@ def wait(tokens: TokenStream) -> tree.Wait | tree.WaitUntil:
         text = tokens.current.text
         advice = f"to let {text} seconds pass, write `PAUSE {text}`"
         tokens.fail(f"expected {_EVENT} after WAIT", f"found `{text}`", advice=advice)
+    if tokens.standard is Standard.RLO_2 and tokens.matches("FOR") and tokens.peek(2).key != "=":
+        # As in KRL and Karel; what follows is no loop.
+        advice = "for a condition write `WAIT UNTIL ...`; to let time pass, `PAUSE 2`"
+        tokens.report("E111", f"expected {_EVENT} after WAIT", tokens.take().span, "found `FOR`", advice=advice)
+        raise PanicModeError
     event = variable(tokens, _EVENT, "after WAIT")
     if tokens.standard is Standard.RLO_2 and tokens.current.key in _OF_CONDITIONS:
         tokens.fail(f"expected {_EVENT} after WAIT", "a condition", advice="for a condition write `WAIT UNTIL ...`")
