@@ -104,12 +104,12 @@ def fixed_notes(recording: Recording) -> Iterator[str]:
     source, told = recording.code.source, set[str]()
     for step in recording.code.instructions:
         if step.op in _READING:
-            note = f"line {source.line(step.span.start)}: what inputs and sensors say is that of the run"
+            note = f"line {source.place(step.span.start)}: what inputs and sensors say is that of the run"
             if note not in told:
                 told.add(note)
                 yield note
     for effect in recording.effects:
-        line = source.line(effect.span.start)
+        line = source.place(effect.span.start)
         if effect.kind == "READ" and effect.arm is None:
             note = f"line {line}: the answer of the camera is that of the run"
         elif effect.kind == "ERROR":
