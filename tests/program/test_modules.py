@@ -496,3 +496,35 @@ def test_names_of_timers_and_whens_are_no_variables() -> None:
 
     assert code is not None
     assert printed(interpret(code, cell, Simulator(cell))) == ["late 0.101", "5 6 7 2 0.101"]
+
+
+def test_record_types_of_one_name_are_two_types() -> None:
+    """Records of two modules do not become one another, though their types have one name."""
+    one, other = (
+        f"""MODULE {name} ;
+        RECORD part ; {fields} : SCALAR ; END ;
+        VAR mine : part ;
+        PROCEDURE show(p : part) ; BEGIN PRINT(p.weight, p.length) END ;
+        BEGIN mine.weight = 1 ; mine.length = 2 END.
+        """
+        for name, fields in (("one", "weight, length"), ("other", "length, weight"))
+    )
+    files = {"one.rlo": one, "other.rlo": other}
+    main = """IMPORT "one.rlo" AS one ; IMPORT "other.rlo" AS other ;
+    BEGIN
+      one.show(one.mine) ;
+      other.show(one.mine) ;
+      other.mine = one.mine ;
+    END."""
+    found = compiled(main, files).diagnostics
+
+    assert [(one.code, main[: one.span.start].count("\n") + 1) for one in found] == [("E262", 4), ("E262", 5)]
+
+
+def test_a_module_is_no_value() -> None:
+    """The name of a module alone is refused, with what could be meant."""
+    found = compiled('IMPORT "grip.rlo" AS g ; VAR n : SCALAR ; BEGIN n = g END.', {"grip.rlo": GRIP}).diagnostics
+
+    assert found[0].code == "E253"
+    assert found[0].message == "`g` is a module, and one of its names is needed here"
+    assert found[0].helps == ("write `g.take`",)
