@@ -361,3 +361,10 @@ def test_what_a_module_cannot_is_refused_in_its_file(tmp_path: Path) -> None:
     (tmp_path / "main.rlo").write_text(RACKED, "utf-8")
     with pytest.raises(ExportError, match=r"^rack\.rlo:12: E619: `TIMER t`"):
         export_program("krl", tmp_path / "main.rlo", CELLS["krl"], mode="program")
+
+
+def test_plan_mode_names_the_when_that_stopped_a_move() -> None:
+    """A MOVE that a WHEN brakes is not called guarded: the WHEN is refused."""
+    text = "BEGIN\nWHEN TIME > 0.1 DO BEGIN BRAKE ; RESUME END ;\nMOVE ARM_1 TO ARM_1 * XYZ(0, 0.1, 0) ;\nEND."
+    with pytest.raises(ExportError, match=r"^test\.rlo:2: E611: what a WHEN does"):
+        export_program("urscript", Source("test.rlo", text), CELLS["urscript"], mode="plan")
