@@ -61,6 +61,7 @@ PROGRAMS = {
     "READ VISIONS": "READ VISIONS (c) ; MOVE ARM_1 TO c ;",
     "TRY, RECOVER": "TRY MOVE ARM_1 TO a * XYZ(5, 0, 0) RECOVER MOVE ARM_1 TO b END ;",
     "MOVE with ON": "MOVE ARM_1 TO c STRAIGHTLY, ON DIST(ARM_1, c) < 0.05 DO HALT ;",
+    "WHEN, BRAKE, RESUME": "WHEN DIST(ARM_1, c) < 0.05 DO BEGIN BRAKE ; RESUME END ; MOVE ARM_1 TO c STRAIGHTLY ;",
     "ZERO FORCE": "ZERO FORCE ARM_1 ;",
     "COBEGIN, one thing after the other": "COBEGIN BEGIN MOVE ARM_1 TO b END ; BEGIN n = 2 END COEND ;",
     "COBEGIN, two things at the same time": (

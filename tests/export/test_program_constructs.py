@@ -24,7 +24,8 @@ CELLS = {
 }
 DECLARED = """
 UNITS MM ;
-VAR a, b, c : FRAME ; slot : ARRAY [2] OF FRAME ; n : SCALAR ; note : TEXT ; flag : BOOLEAN ;
+RECORD part ; weight : SCALAR ; place : FRAME ; END ;
+VAR item : ARRAY [2] OF part ; a, b, c : FRAME ; slot : ARRAY [2] OF FRAME ; n : SCALAR ; note : TEXT ; flag : BOOLEAN ;
 PROCEDURE visit(f : FRAME) ; BEGIN MOVE ARM_1 TO f END ;
 FUNCTION beside(f : FRAME) : FRAME ; BEGIN RETURN f * XYZ(n, 0, 0) END ;
 BEGIN
@@ -37,6 +38,7 @@ PROGRAMS = {
     "assignment, numbers, conditions": "n = n + 1 ; flag = n > 2 ;",
     "frames, `f * t`, INV": "c = a * XYZ(0, 0, 20) ; MOVE ARM_1 TO c * (INV(a) * b) ;",
     "arrays": "slot[1] = a ; MOVE ARM_1 TO slot[1] ;",
+    "RECORD": "item[1].weight = 5 ; item[1].place = b ; item[2] = item[1] ; MOVE ARM_1 TO item[2].place ;",
     "IF": "IF n > 2 THEN PAUSE 0.1 ELSE PAUSE 0.2 ;",
     "WHILE, REPEAT": "WHILE n > 49 DO n = n - 1 ; REPEAT n = n + 1 UNTIL n > 60 ;",
     "FOR": "FOR n = 1 TO 3 DO PAUSE 0.1 ;",
@@ -60,6 +62,12 @@ PROGRAMS = {
     "MOVE with ON": "MOVE ARM_1 TO b STRAIGHTLY, ON DIST(ARM_1, b) < 5 DO HALT ;",
     "OPEN to a width": "OPEN ARM_1 TO 40mm ;",
     "TRY, RECOVER, RAISE": "TRY RAISE odd ; RECOVER PAUSE 0.1 ; END ;",
+    "WHEN, BRAKE, RESUME": "WHEN n > 99 DO n = 1 ;",
+    "TIMER": "TIMER t ON ;",
+    "MOVE to JOINTS": "MOVE ARM_1 TO JOINTS(10, -80, 90, 0, 30, 0) ;",
+    "CIRCULARLY": "MOVE ARM_1 TO b CIRCULARLY, VIA (b * XYZ(20, 20, 0)) ;",
+    "VELOCITY, ROTATION, ACCELERATION": "MOVE ARM_1 TO b STRAIGHTLY, WITH ROTATION = 20 ;",
+    "BLEND into the next MOVE": "MOVE ARM_1 TO b WITH BLEND = 10 ; MOVE ARM_1 TO a ;",
     "COBEGIN, EVENT, LOCK": "COBEGIN BEGIN PAUSE 0.1 END ; BEGIN n = 2 END COEND ;",
     "TIME, LOG, TEXT, MOD, ROUND, FORCE, ANALOG": 'note = TEXT("n", n) ; PRINT(note) ;',
 }
@@ -96,4 +104,4 @@ def test_cells_of_the_table(target: str, construct: str, tmp_path: Path) -> None
     with pytest.raises(ExportError) as caught:
         export_program(target, compiled, mode="program")
     assert caught.value.diagnostic.code == said
-    assert str(caught.value).startswith("construct.rlo:11: ")
+    assert str(caught.value).startswith("construct.rlo:12: ")

@@ -313,3 +313,58 @@ def test_random_programs(target: str, sample) -> None:
     sample.record(f"random programs in {target}", proved, 0, refused=refused, not_run=failed)
     assert proved + failed > refused
     assert proved
+
+
+RACK = """MODULE rack ;
+UNITS MM ;
+RECORD tray ; corner : FRAME ; used : SCALAR ; END ;
+VAR n : SCALAR ; STOP : FRAME ; mine : tray ;
+PROCEDURE go (INOUT t : tray, dx : SCALAR) ;
+BEGIN
+  MOVE ARM_1 TO t.corner * XYZ(dx, 0, 0) STRAIGHTLY ;
+  t.used = t.used + 1 ; n = n + 1 ;
+END ;
+PROCEDURE never ;
+BEGIN
+  {} ;
+END ;
+BEGIN
+  n = 5 ; mine.used = 0 ; mine.corner = STOP * XYZ(10, 0, -40) ; STOP = STOP * XYZ(0, 20, 0) ;
+END.
+"""
+RACKED = """IMPORT "rack.rlo" AS r ;
+UNITS MM ;
+VAR n : SCALAR ; t : r.tray ;
+BEGIN
+  n = 7 ; t = r.mine ;
+  r.go(r.mine, 15) ; r.go(t, 25) ;
+  IF r.n > 6 THEN MOVE ARM_1 TO r.STOP ELSE r.never() ;
+  PRINT("n", n, r.n, t.used) ;
+END.
+"""
+
+
+@pytest.mark.parametrize("target", CELLS)
+def test_modules_and_records(target: str, tmp_path: Path) -> None:
+    """What modules do before the program begins is done, their names stay apart, and notes name their files."""
+    (tmp_path / "rack.rlo").write_text(RACK.format("MOVE ARM_1 TO mine.corner"), "utf-8")
+    (tmp_path / "main.rlo").write_text(RACKED, "utf-8")
+    files = export_program(target, tmp_path / "main.rlo", CELLS[target], mode="program")
+
+    assert next(one.worst for one in files.proof.comparisons if one.quantity == STATEMENTS) == 0
+    assert any(note.startswith("line 12 of rack.rlo: ") for note in files.proof.notes)
+
+
+def test_what_a_module_cannot_is_refused_in_its_file(tmp_path: Path) -> None:
+    """A statement of a module that has no counterpart is named with the line of the module."""
+    (tmp_path / "rack.rlo").write_text(RACK.format("TIMER t ON"), "utf-8")
+    (tmp_path / "main.rlo").write_text(RACKED, "utf-8")
+    with pytest.raises(ExportError, match=r"^rack\.rlo:12: E619: `TIMER t`"):
+        export_program("krl", tmp_path / "main.rlo", CELLS["krl"], mode="program")
+
+
+def test_plan_mode_names_the_when_that_stopped_a_move() -> None:
+    """A MOVE that a WHEN brakes is not called guarded: the WHEN is refused."""
+    text = "BEGIN\nWHEN TIME > 0.1 DO BEGIN BRAKE ; RESUME END ;\nMOVE ARM_1 TO ARM_1 * XYZ(0, 0.1, 0) ;\nEND."
+    with pytest.raises(ExportError, match=r"^test\.rlo:2: E611: what a WHEN does"):
+        export_program("urscript", Source("test.rlo", text), CELLS["urscript"], mode="plan")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.reader import read_cell
+from armwright.cell.simulator import Simulator
 from armwright.errors import InvalidValueError
 from armwright.files.limits import raised
 from armwright.program import Compilation, Source, compile as translate, run
@@ -28,9 +29,10 @@ from armwright.program.language_server.rename import rename
 from armwright.program.repl.session import Session
 from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule
 from armwright.program.syntax import tree
+from armwright.program.vm.interpreter import interpret
 from cli_calls import armwright
 from program.debugger.client import Client
-from program.running import cell_of
+from program.running import cell_of, printed
 from program.shelf import ACCEPTED, CORPUS, OLD, compile_file
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -466,3 +468,63 @@ def test_editor_points_at_the_import(tmp_path: Path) -> None:
     assert told.range.start.line == 0
     assert told.message == "lib/g.rlo has 1 error; the first: `wide` is not declared"
     assert [one.location.range.start.line for one in told.related_information or ()] == [5]
+
+
+def test_names_of_timers_and_whens_are_no_variables() -> None:
+    """A timer or WHEN in a module may have the name of a variable of any file, or of a record."""
+    module = """MODULE m ;
+    VAR own : SCALAR ;
+    PROCEDURE work ;
+    BEGIN
+      WHEN k : TIMER(t) > 0.1 DO BEGIN WHEN k OFF ; TIMER t OFF ; own = own + 1 END ;
+      WHEN own : TIMER(own) > 0.2 DO PRINT("late", TIMER(t)) ;
+      TIMER t ON ; TIMER own ON ; PAUSE 0.3 ; WHEN own OFF ;
+    END ;
+    BEGIN own = 1 END.
+    """
+    main = """IMPORT "m.rlo" AS m ;
+    RECORD part ; weight : SCALAR ; END ;
+    VAR t : part ; k, own : SCALAR ;
+    BEGIN
+      t.weight = 5 ; k = 6 ; own = 7 ;
+      m.work() ;
+      PRINT(t, k, own, m.own, TIMER(t)) ;
+    END.
+    """
+    cell = cell_of("cell1")
+    code = compiled(main, {"m.rlo": module}, cell).code
+
+    assert code is not None
+    assert printed(interpret(code, cell, Simulator(cell))) == ["late 0.101", "5 6 7 2 0.101"]
+
+
+def test_record_types_of_one_name_are_two_types() -> None:
+    """Records of two modules do not become one another, though their types have one name."""
+    one, other = (
+        f"""MODULE {name} ;
+        RECORD part ; {fields} : SCALAR ; END ;
+        VAR mine : part ;
+        PROCEDURE show(p : part) ; BEGIN PRINT(p.weight, p.length) END ;
+        BEGIN mine.weight = 1 ; mine.length = 2 END.
+        """
+        for name, fields in (("one", "weight, length"), ("other", "length, weight"))
+    )
+    files = {"one.rlo": one, "other.rlo": other}
+    main = """IMPORT "one.rlo" AS one ; IMPORT "other.rlo" AS other ;
+    BEGIN
+      one.show(one.mine) ;
+      other.show(one.mine) ;
+      other.mine = one.mine ;
+    END."""
+    found = compiled(main, files).diagnostics
+
+    assert [(one.code, main[: one.span.start].count("\n") + 1) for one in found] == [("E262", 4), ("E262", 5)]
+
+
+def test_a_module_is_no_value() -> None:
+    """The name of a module alone is refused, with what could be meant."""
+    found = compiled('IMPORT "grip.rlo" AS g ; VAR n : SCALAR ; BEGIN n = g END.', {"grip.rlo": GRIP}).diagnostics
+
+    assert found[0].code == "E253"
+    assert found[0].message == "`g` is a module, and one of its names is needed here"
+    assert found[0].helps == ("write `g.take`",)

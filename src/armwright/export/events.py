@@ -3,21 +3,27 @@
 import json
 from collections.abc import Iterator
 
+from armwright.program.language.source import Source, Span
 from armwright.program.vm.recording import Effect, Recording
 
 _SWITCHED = {"OPEN": False, "GRASP": True}
 
 
 def events_file(recording: Recording) -> str:
-    """Return the text of ``events.json``: what is switched and shown, when, and in which line of the program."""
-    source = recording.code.source
+    """Return the text of ``events.json``: what is switched and shown, when, and in which line of which file."""
     rows = [
-        {"time": effect.t0, "line": source.line(effect.span.start), **data}
+        {"time": effect.t0, **_place(recording.code.source, effect.span), **data}
         for effect in recording.effects
         for data in _events(effect)
     ]
     body = ",\n".join(json.dumps(row) for row in rows)
     return f"[\n{body}\n]\n" if rows else "[]\n"
+
+
+def _place(source: Source, span: Span) -> dict[str, object]:
+    """Return the line of a statement, and in a module the file."""
+    line: dict[str, object] = {"line": source.line(span.start)}
+    return {**line, "file": source.name_at(span.start)} if source.file_number(span.start) else line
 
 
 def _events(effect: Effect) -> Iterator[dict[str, object]]:

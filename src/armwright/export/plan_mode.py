@@ -104,12 +104,12 @@ def fixed_notes(recording: Recording) -> Iterator[str]:
     source, told = recording.code.source, set[str]()
     for step in recording.code.instructions:
         if step.op in _READING:
-            note = f"line {source.line(step.span.start)}: what inputs and sensors say is that of the run"
+            note = f"line {source.place(step.span.start)}: what inputs and sensors say is that of the run"
             if note not in told:
                 told.add(note)
                 yield note
     for effect in recording.effects:
-        line = source.line(effect.span.start)
+        line = source.place(effect.span.start)
         if effect.kind == "READ" and effect.arm is None:
             note = f"line {line}: the answer of the camera is that of the run"
         elif effect.kind == "ERROR":
@@ -134,15 +134,15 @@ def refuse_guards(recording: Recording) -> None:
         has_guard = step.op is Op.MVON or (has_guard and step.op is not Op.MVBEG)
         if step.op is Op.MVEND and has_guard:
             guarded.add(step.span)
+    for step in recording.code.instructions:
+        if step.op is Op.WHEN:
+            text = "what a WHEN does depends on what it meets, and a planned motion is always the same"
+            raise refusal(source, "E611", text, step.span, "armed here", helps=["leave the WHEN out of this program"])
     for stage in recording.stages:
         if stage.span in guarded or stage.stopped:
             text = "a MOVE that ends by its guard depends on what it meets, and a planned motion is always the same"
             helps = ["leave the ON out of this MOVE, or end it by a frame"]
             raise refusal(source, "E611", text, stage.span, "this MOVE is guarded", helps=helps)
-    for step in recording.code.instructions:
-        if step.op is Op.WHEN:
-            text = "what a WHEN does depends on what it meets, and a planned motion is always the same"
-            raise refusal(source, "E611", text, step.span, "armed here", helps=["leave the WHEN out of this program"])
     for effect in recording.effects:
         if effect.kind == "ZERO":
             text = "ZERO FORCE sets a force sensor, which a planned motion does not read"

@@ -167,8 +167,10 @@ class _Machine(Machine):
         scope = self.frames[-1] if self.frames and name in self.frames[-1] else self.variables
         if name not in scope:
             raise CheckError(f"line {line}: {name} is not declared")
-        kinds = self.types[-1] if scope is not self.variables else self.types[0]
-        scope[name] = _as_type(kinds[name], value, line)
+        scope[name] = _as_type(self._type(name), value, line)
+
+    def _type(self, name: str) -> str:
+        return self.types[-1 if self.frames and name in self.frames[-1] else 0][name]
 
     def _assign(self, target: Any, value: Any, line: int) -> None:
         name, *others = target.children
@@ -188,7 +190,8 @@ class _Machine(Machine):
         elif not others:
             self._store(name, value, line)
         elif hasattr(others[0], "data"):
-            self.lookup(name, line)[tuple(self.value(one) for one in others)] = dict(value)
+            elements = self.lookup(name, line)
+            elements[tuple(self.value(one) for one in others)] = _as_type(self._type(name), value, line)
         else:
             fields_of = self.lookup(name, line)
             if fields_of is None:

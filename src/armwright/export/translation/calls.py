@@ -27,7 +27,7 @@ def _called(
 ) -> tuple[str, tuple[Value, ...]]:
     """Return the key of a procedure as a call needs it, and the arguments that it passes."""
     own = context.scope.symbols.procedures.get(name.key)
-    if own is None or own.node not in context.compiled.tree.procedures:
+    if own is None or own.node not in context.compiled.whole.procedures:
         text = f"`{name.text}` is no procedure of this file"
         context.refuse(span, text, "it is called here", "write it into the program")
     if name.key in context.active:

@@ -180,6 +180,10 @@ def _refuse_clauses(context: Context, node: tree.Move) -> None:
         if isinstance(clause, tree.On):
             text = "a MOVE that ends by its guard has no counterpart that a proof can run"
             context.refuse(node.span, text, "this MOVE is guarded", "leave the ON out of this MOVE", code="E611")
+        if isinstance(clause, tree.Blend) and not any(isinstance(other, tree.Via) for other in node.clauses):
+            text = "which MOVE this one goes over into is known while the program runs"
+            advice = "write one MOVE, with these frames in VIA", "export the run by `--mode plan`"
+            context.refuse(clause.span, text, "BLEND into the next MOVE", *advice)
         if not isinstance(clause, (*_CLAUSES, tree.Duration)):
             context.refuse_construct(clause)
 
@@ -281,7 +285,7 @@ def read_visions(context: Context, node: tree.ReadVisions) -> None:
         if all(one.key != key for one in context.procedures):
             answer = Return(span=node.span, value=Pose(seen[0]))
             context.procedures.append(Procedure(key=key, parameters=(), result="pose", body=(answer,)))
-        line = context.compiled.source.line(node.span.start)
+        line = context.compiled.source.place(node.span.start)
         note = f"line {line}: a function answers for the camera as in the run: let it ask the camera of the controller"
         context.notes.setdefault(note)
         place_frame(context, node, name, variable, FunctionCall(key, ()))
@@ -301,7 +305,7 @@ def wait_until(context: Context, node: tree.WaitUntil) -> None:
     if node.otherwise is not None:
         late = context.block(node.otherwise)
     elif limit is not None:
-        line = context.compiled.source.line(node.span.start)
+        line = context.compiled.source.place(node.span.start)
         late = (Print(span=node.span, items=(f"line {line}: too late",)), Halt(span=node.span))
     context.attachments = before.join(context.attachments)
     context.out.append(WaitUntil(span=node.span, condition=condition, limit=limit, late=late))

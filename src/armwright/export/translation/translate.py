@@ -63,7 +63,7 @@ def translate_program(compiled: Compilation, recording: Recording, name: str) ->
 
 def _translated(compiled: Compilation, recording: Recording, arm: str, *, keeps_hand: bool) -> Context:
     cell = recording.cell
-    names = (node.key for node in tree.walk(compiled.tree) if isinstance(node, tree.Name))
+    names = (node.key for node in tree.walk(compiled.whole) if isinstance(node, tree.Name))
     context = Context(
         translators=TRANSLATORS,
         call_function=calls.call_function,
@@ -79,13 +79,13 @@ def _translated(compiled: Compilation, recording: Recording, arm: str, *, keeps_
     if keeps_hand:
         context.declare(arm, "pose", initial=Pose(cell.tree().world(arm)))
     _constants(context)
-    context.translate(*compiled.tree.statements)
+    context.translate(*compiled.whole.statements)
     return context
 
 
 def _constants(context: Context) -> None:
     """Work out the constants of the program."""
-    for node in context.compiled.symbols.constant_assignments(context.compiled.tree):
+    for node in context.compiled.symbols.constant_assignments(context.compiled.whole):
         key = node.target.key  # type: ignore[union-attr]
         context.constants[key] = (
             node.value.value if isinstance(node.value, tree.String) else value_of(context, node.value)
@@ -125,4 +125,4 @@ def _notes(context: Context) -> Iterator[str]:
     yield from context.notes
     for start, reached in sorted(context.reached.items()):
         if not reached:
-            yield f"line {source.line(start)}: the run does not come to this MOVE: it is slow, and not compared"
+            yield f"line {source.place(start)}: the run does not come to this MOVE: it is slow, and not compared"

@@ -151,9 +151,12 @@ def _import_names(program: ProgramFiles, seen: Mapping[str, FileNames], path: st
 
 
 def unknown_member(names: FileNames, name: tree.Name) -> tuple[str, str, str]:
-    """Return message, label and advice for a name of a module that the module does not have."""
+    """Return message, label and advice for a name of a module that the module does not have, or for none."""
     module, _, member = name.text.partition(".")
     brought = names.modules[module.upper()]
+    if not member:
+        first = next((meaning.declared.text for meaning in brought.values()), "name")
+        return f"`{module}` is a module, and one of its names is needed here", "a module", f"write `{module}.{first}`"
     near = closest(member, [meaning.declared.text for meaning in brought.values()])
     return f"module `{module}` has no `{member}`", "unknown name", did_you_mean(near and f"{module}.{near}")
 

@@ -15,6 +15,9 @@ Rename: TypeAlias = Callable[[tree.Name], tree.Name | tree.Poison]
 _OTHER_NAMES: dict[type, tuple[str, ...]] = {
     tree.Operate: ("device",),
     tree.Pulse: ("device",),
+    tree.SetTimer: ("name",),
+    tree.When: ("name",),
+    tree.WatchSwitch: ("name",),
     tree.Raise: ("kind",),
     tree.Try: ("kinds",),
 }

@@ -332,6 +332,8 @@ class _Layout:
             what = "no record" if target is None else _phrase(target)
             other = "none" if value is None else _phrase(value)
             text = f"{quote_expression(node.target)} is {what}, but {quote_expression(node.value)} is {other}"
+            if target is not None and value is not None and _alike(target, value):
+                text = f"{quote_expression(node.target)} is {what}, which is not assigned as a whole"
             advice = "assign the elements one by one" if target is not None and target.sizes else ""
             self._report("E262", text, node.value.span, "another type", advice=advice)
             return tree.Poison(node.span)
@@ -361,7 +363,7 @@ class _Layout:
                 arguments += self._fields(argument, given)
             elif wanted is None:
                 arguments.append(self._rewriter(argument))
-            if (wanted is None) != (given is None) or (wanted and given and str(wanted) != str(given)):
+            if (wanted is None) != (given is None) or (wanted and given and not _alike(wanted, given)):
                 what, written = _phrase(wanted) if wanted else "no record", quote_expression(argument)
                 text = f"parameter `{parameter.text}` of `{node.name.text}` is {what}"
                 text += f", but {written} is {_phrase(given) if given else 'none'}"
@@ -375,6 +377,11 @@ def _part(name: tree.Name, field: str, variable: RecordVariable) -> tree.Name:
     """Return the variable of a field."""
     text = variable.type.names[field].text
     return tree.Name(name.span, f"{name.text}.{text}", f"{name.key}.{field}")
+
+
+def _alike(first: RecordVariable, second: RecordVariable) -> bool:
+    """Whether two records are of one type; modules may have types of the same name."""
+    return first.type is second.type and str(first) == str(second)
 
 
 def _phrase(variable: RecordVariable) -> str:
