@@ -129,6 +129,10 @@ def test_bad_numbers() -> None:
         load_of([0, 1], [1, 1], [1, 1], dwell=-1)
     with pytest.raises(InvalidValueError, match="wear rates"):
         WearRates(median=np.array([-1.0]), spread=np.array([0.1]))
+    with pytest.raises(ShapeError, match="wear rates"):
+        WearRates(median=[1e-9, 1e-9], spread=0.1)
+    with pytest.raises(ShapeError, match="one per joint, 6, got 2"):
+        play_life(PUMA, np.zeros(6), 1e-6, WearRates(median=[1e-9, 1e-9], spread=[0.1, 0.1]), 1e-4)
     with pytest.raises(InvalidValueError, match="play"):
         play_life(PUMA, np.zeros(6), -1e-6, WearRates(median=np.zeros(6), spread=np.zeros(6)), 1e-4)
     with pytest.raises(InvalidValueError, match="errors above 0"):
