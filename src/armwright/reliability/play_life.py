@@ -63,6 +63,8 @@ class PlayLife(NamedTuple):
 
     def quantile(self, part: float) -> float:
         """Return the cycles that this part of the arms does not reach."""
+        if not 0 <= part <= 1:
+            raise InvalidValueError(f"part: expected 0 to 1, got {part:g}")
         return float(np.quantile(self.cycles, part, method="inverted_cdf"))
 
 
