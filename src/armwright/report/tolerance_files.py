@@ -117,6 +117,8 @@ def _changes(assessment: ToleranceAssessment, allocation: Allocation) -> str:
     values = [float(widths[i] / assessment.tolerances[i].half_width) for i in order]
     _bars(axes, [assessment.tolerances[i].name for i in order], values, start=1.0)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}" if max(values) < 10 * min(values) else "")
     axes.axvline(1, color="C7", linewidth=1)
     return svg_text(figure, "Tolerances of least cost")
 
