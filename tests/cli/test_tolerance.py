@@ -44,6 +44,7 @@ def test_of_a_path(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         *("report.html", "tolerance.json", "run.json", "errors.svg", "shares.svg", "costs.svg")
     }
+    assert "mathdefault" not in (tmp_path / "out" / "costs.svg").read_text(encoding="utf-8")  # 2, not 2 × 10⁰
     lines = done.stdout.splitlines()
     first = next(i for i, line in enumerate(lines) if line.lstrip().startswith("dimension"))
     assert lines[first + 2].split()[0] == "joint2.theta"

@@ -8,7 +8,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.positions import ranges
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.jacobians import jacobian
-from armwright.reliability.play_life import WearRates, play_life, repeatability_factors
+from armwright.reliability.play_life import PlayLife, WearRates, play_life, repeatability_factors
 from armwright.reliability.reducer_life import ROLLERS, Rating, joint_speed, life_hours, load_of
 from armwright.reliability.wear_update import RatePosterior, updated_rate
 from samples import Sample
@@ -129,7 +129,18 @@ def test_bad_numbers() -> None:
         load_of([0, 1], [1, 1], [1, 1], dwell=-1)
     with pytest.raises(InvalidValueError, match="wear rates"):
         WearRates(median=np.array([-1.0]), spread=np.array([0.1]))
+    with pytest.raises(ShapeError, match="wear rates"):
+        WearRates(median=[1e-9, 1e-9], spread=0.1)
+    with pytest.raises(ShapeError, match="one per joint, 6, got 2"):
+        play_life(PUMA, np.zeros(6), 1e-6, WearRates(median=[1e-9, 1e-9], spread=[0.1, 0.1]), 1e-4)
     with pytest.raises(InvalidValueError, match="play"):
         play_life(PUMA, np.zeros(6), -1e-6, WearRates(median=np.zeros(6), spread=np.zeros(6)), 1e-4)
+    with pytest.raises(InvalidValueError, match="first"):
+        rate_after(-1.0, [], [], [])
+    for quantile in (rate_after(0.0, [], [], []).quantile, PlayLife(np.ones(3), *[np.ones(1)] * 3, 0).quantile):
+        with pytest.raises(InvalidValueError, match="expected 0 to 1, got nan"):
+            quantile(np.nan)
+    with pytest.raises(InvalidValueError, match="peak: expected more than 0"):
+        Rating(effort=1, speed=1, hours=1, peak=-1)
     with pytest.raises(InvalidValueError, match="errors above 0"):
         rate_after(0.0, [1.0], [1.0], [0.0])

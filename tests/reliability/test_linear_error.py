@@ -129,3 +129,14 @@ def test_what_is_no_error(changed: dict, error: type[Exception]) -> None:
     fields = {"names": ("a",), "deviations": [1.0], "offset": [[0.0, 0]], "jacobian": [[[1.0], [0]]]}
     with pytest.raises(error):
         LinearError(**(fields | changed))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_fewer_deviations_than_coordinates(count: int, rng: np.random.Generator) -> None:
+    """One or two deviations of an error in space are sampled as well as many."""
+    jacobian = rng.normal(size=(1, 3, count))
+    names = tuple(f"x{i}" for i in range(count))
+    error = LinearError(names=names, deviations=np.ones(count), offset=np.zeros((1, 3)), jacobian=jacobian)
+    limit = 3 * float(np.linalg.norm(jacobian[0], 2))
+    found = error.path_probability(limit, samples=20_000)
+    assert found.probability == pytest.approx(error.pose_probabilities(limit)[0], abs=5 * found.standard_error)

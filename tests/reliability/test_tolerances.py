@@ -12,6 +12,7 @@ from armwright.arm.positions import ranges
 from armwright.errors import FileFormatError, InvalidValueError
 from armwright.reliability.allocation import allocate, error_bounds
 from armwright.reliability.arm_errors import sampled_errors, tool_error
+from armwright.reliability.assessment import assess_tolerances
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tolerances import Tolerance, dimensions, read_tolerances
 from armwright.reliability.worst_case import longest_sum
@@ -75,12 +76,15 @@ def test_file(tolerances: tuple[Tolerance, ...]) -> None:
     ("text", "said"),
     [
         ("", "expected a tolerance above zero"),
-        ("[joints]\ntheta_deg = -1", "expected 0 or more"),
+        ("[joints]\ntheta_deg = -1", "expected 0 to 180"),
+        ("[joints]\nd_mm = 1e90", r"expected 0 to 1e\+06"),
+        ("[tool]\nposition_mm = 1e-300", "expected 0, or 1e-09 or more"),
+        ("[tool]\nposition_mm = 1\n[cost.factors]\n'tool.x' = 1e99", "expected 1e-09 to"),
         ("[joints]\ntheta_dg = 1", "did you mean 'theta_deg'"),
         ("[joint.7]\ntheta_deg = 1", "unknown key"),
         ("[joint.2]\ntheta_deg = nan", "finite"),
         ("[tool]\nposition_mm = 1\n[cost.factors]\n'joint9.d' = 2", "no such dimension"),
-        ("[tool]\nposition_mm = 1\n[cost]\nexponent = 0", "above 0"),
+        ("[tool]\nposition_mm = 1\n[cost]\nexponent = 0", "expected 0.01 to 10"),
         ("joints = 3", "expected a table"),
     ],
 )
@@ -187,3 +191,59 @@ def test_idle_dimensions_are_free() -> None:
     assert found.costs[1] == 0
     with pytest.raises(InvalidValueError, match="no deviation moves the tool"):
         allocate(named(np.ones(2)), unit_error(jacobian * 0), 0.5, "worst-case")
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-150, 1e150, 1e200])
+def test_longest_sum_is_as_long_in_other_units(scale: float, rng: np.random.Generator) -> None:
+    """Products of small or large generators neither vanish nor overflow."""
+    G = rng.normal(size=(3, 7))
+    length, _ = longest_sum(G)
+    assert longest_sum(G * scale)[0] == pytest.approx(length * scale, rel=1e-12)
+    assert longest_sum(G * 0)[0] == 0
+
+
+def test_short_generators_beside_long_ones(rng: np.random.Generator) -> None:
+    """Generators that leave the plane of long ones by rounding have corners too."""
+    for _ in range(50):
+        G = rng.normal(size=(3, 9)) * 10.0 ** rng.choice([0, -10], size=9)
+        signs = np.array(list(itertools.product((-1, 1), repeat=9)))
+        assert longest_sum(G)[0] == pytest.approx(np.linalg.norm(signs @ G.T, axis=1).max(), rel=1e-9)
+
+
+@pytest.mark.parametrize("uniform", [False, True])
+def test_linear_law_is_compared_for_the_same_arms(*, uniform: bool) -> None:
+    """By whatever law arms are drawn, the linear one is near for small tolerances, and is said not to be for large."""
+    q = [[0.1, -0.3, 0.5, 0, 0.7, 0]]
+    for degrees, near in ((0.01, True), (180.0, False)):
+        swing = [Tolerance(name="joint1.theta", half_width=np.radians(degrees), is_length=False)]
+        found = assess_tolerances(PUMA, q, swing, samples=200, uniform=uniform)
+        assert (found.nonlinearity < 1e-4) == near
+        assert any("trust the sampled" in note for note in found.notes) == (not near)
+    spin = [Tolerance(name="tool.rx", half_width=0.01, is_length=False)]
+    assert assess_tolerances(PUMA, q, spin, samples=20).nonlinearity < 1e-3
+
+
+def test_long_tables_are_thinned(tolerances: tuple[Tolerance, ...]) -> None:
+    """Of many poses some are computed, the first and the last included; their numbers are those of the table."""
+    q = np.linspace([0, -0.4, 0.5, 0, 0.6, 0], [1, 0.2, 0.9, 0.4, 0.8, 0.2], 10_000)
+
+    found = assess_tolerances(PUMA, q, tolerances, samples=10, most=4)
+
+    assert found.numbers.tolist() == [1, 3334, 6667, 10_000]
+    np.testing.assert_array_equal(found.q, q[found.numbers - 1])
+    assert any("4 of the 10000 poses" in note for note in found.notes)
+    assert [pose["number"] for pose in found.as_data()["poses"]] == found.numbers.tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"samples": 10**9}, "at most 20000000 random arms"),
+        ({"limit": 1e-300}, "limit: expected 1e-12 to"),
+        ({"limit": 1e90}, "limit: expected 1e-12 to"),
+    ],
+)
+def test_what_is_too_much(options: dict, said: str, tolerances: tuple[Tolerance, ...]) -> None:
+    """Numbers of samples and limits are bounded."""
+    with pytest.raises(InvalidValueError, match=said):
+        assess_tolerances(PUMA, np.zeros(6), tolerances, **options)

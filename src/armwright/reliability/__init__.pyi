@@ -1,5 +1,9 @@
 from .allocation import Allocation as Allocation, allocate as allocate, error_bounds as error_bounds
-from .arm_errors import sampled_errors as sampled_errors, tool_error as tool_error
+from .arm_errors import (
+    sampled_deviations as sampled_deviations,
+    sampled_errors as sampled_errors,
+    tool_error as tool_error,
+)
 from .assessment import ToleranceAssessment as ToleranceAssessment, assess_tolerances as assess_tolerances
 from .exceedance import exceedance as exceedance
 from .first_order import (

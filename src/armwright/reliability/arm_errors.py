@@ -10,10 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, integer, joint_array
 from armwright.calibration.chain import kinematic_chain
 from armwright.reliability.linear_error import LinearError
-from armwright.reliability.tolerances import Tolerance
-
-# Numbers of a block of samples.
-_BLOCK = 2_000_000
+from armwright.reliability.tolerances import SIGMAS, Tolerance
 
 
 def tool_error(arm: Arm, q: ArrayLike, tolerances: Sequence[Tolerance]) -> LinearError:
@@ -40,6 +37,14 @@ def tool_error(arm: Arm, q: ArrayLike, tolerances: Sequence[Tolerance]) -> Linea
     )
 
 
+def sampled_deviations(tolerances: Sequence[Tolerance], *, samples: int, seed: int = 0, uniform: bool = False) -> Array:
+    """Return the deviations (samples, k) of random arms within k tolerances [m] or [rad]; see ``sampled_errors``."""
+    widths = np.array([tolerance.half_width for tolerance in tolerances])
+    shape = (integer(samples, "samples", least=1), len(widths))
+    rng = np.random.default_rng(seed)
+    return np.asarray(widths * (rng.uniform(-1, 1, shape) if uniform else rng.normal(scale=1 / SIGMAS, size=shape)))
+
+
 def sampled_errors(
     arm: Arm, q: ArrayLike, tolerances: Sequence[Tolerance], *, samples: int, seed: int = 0, uniform: bool = False
 ) -> Array:
@@ -56,15 +61,14 @@ def sampled_errors(
     Returns:
         (samples, p) [m].
     """
-    chain, rng = kinematic_chain(arm), np.random.default_rng(seed)
+    chain = kinematic_chain(arm)
     configurations = np.atleast_2d(joint_array(q, arm.n))
     columns = [chain.names.index(tolerance.name) for tolerance in tolerances]
-    widths = np.array([tolerance.half_width for tolerance in tolerances])
+    deviations = sampled_deviations(tolerances, samples=samples, seed=seed, uniform=uniform)
     nominal = chain.forward(configurations).position
-    found = np.empty((integer(samples, "samples", least=1), len(configurations)))
+    found = np.empty((len(deviations), len(configurations)))
     errors = np.zeros(len(chain.names))
-    for k in range(len(found)):
-        unit = rng.uniform(-1, 1, len(widths)) if uniform else rng.normal(scale=1 / 3, size=len(widths))
-        errors[columns] = widths * unit
+    for k, own in enumerate(deviations):
+        errors[columns] = own
         found[k] = np.linalg.norm(chain.forward(configurations, errors).position - nominal, axis=-1)
     return found

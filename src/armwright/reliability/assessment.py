@@ -11,15 +11,21 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, integer, joint_array, positive
-from armwright.errors import TooFewError
+from armwright.errors import InvalidValueError, TooFewError
 from armwright.files.result_table import ResultTable
 from armwright.reliability.allocation import Allocation, Rule, allocate, error_bounds
-from armwright.reliability.arm_errors import sampled_errors, tool_error
+from armwright.reliability.arm_errors import sampled_deviations, sampled_errors, tool_error
 from armwright.reliability.linear_error import Estimate, LinearError
 from armwright.reliability.tolerances import Tolerance
 
-# The linear law is said to be off where its longest errors differ by more from those of the full kinematics.
+# The linear law is said to be off where its errors differ by more from those of the full kinematics.
 _LINEAR = 0.01
+# Errors below this are rounding [m].
+_ROUNDING = 1e-12
+# Least and largest limit of the error [m].
+_LIMITS = (1e-12, 1e6)
+# Numbers of sampled errors at most.
+_SAMPLED = 20_000_000
 _MEANING = (
     "Tolerances are half widths. Worst case: all dimensions are at the ends of their tolerances. Statistical: "
     "deviations are normal and independent, and a tolerance is three standard deviations."
@@ -33,12 +39,16 @@ class ToleranceAssessment:
     Attributes:
         arm: the nominal arm, with n joints.
         q: (p, n) the configurations [rad] or [m].
+        numbers: (p,) of each among those that were given, from 1.
+        given: how many were given.
         tolerances: k of its dimensions.
         error: of the tool's position, linear in the deviations.
         limit: of the error [m]; None where none is asked for.
         worst_case: (p,) the longest error at each pose [m].
         statistical: (p,) three standard deviations along the direction in which the error varies most [m].
         sampled: (samples, p) lengths of the errors of random arms by their full kinematics [m].
+        nonlinearity: root mean square of what these differ by from the errors of the linear law, by that of the latter,
+            at the pose where this is largest.
         on_path: probability that the error is beyond the limit at any pose; None without a limit.
         at_poses: (p,) the same at each pose, by the exact law; None without a limit.
         allocation: tolerances of least cost that keep the limit; None where none is asked for.
@@ -47,12 +57,15 @@ class ToleranceAssessment:
 
     arm: Arm
     q: Array
+    numbers: Array
+    given: int
     tolerances: tuple[Tolerance, ...]
     error: LinearError
     limit: float | None
     worst_case: Array
     statistical: Array
     sampled: Array
+    nonlinearity: float
     on_path: Estimate | None = None
     at_poses: Array | None = None
     allocation: Allocation | None = None
@@ -68,18 +81,15 @@ class ToleranceAssessment:
         """The dimensions, those with the largest share of the variance at the worst pose first."""
         return [int(i) for i in np.argsort(-self.error.shares[self.worst_pose], kind="stable")]
 
-    @cached_property
-    def nonlinearity(self) -> float:
-        """How far three root mean squares of the sampled errors are from those of the linear law, at most, relative."""
-        linear = np.sqrt(np.trace(self.error.covariance, axis1=1, axis2=2))
-        return float(np.abs(np.sqrt((self.sampled**2).mean(axis=0)) / np.maximum(linear, 1e-300) - 1).max())
-
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know beside the numbers."""
-        spread = 4 / np.sqrt(len(self.sampled))
         notes = [_MEANING]
-        if self.nonlinearity > _LINEAR + spread:
+        if len(self.q) < self.given:
+            notes.append(
+                f"{len(self.q)} of the {self.given} poses are computed, evenly spread; the error may be longer between."
+            )
+        if self.nonlinearity > _LINEAR:
             notes.append(
                 f"The errors of the full kinematics differ by {self.nonlinearity:.1%} from the linear law: trust the "
                 "sampled ones."
@@ -96,6 +106,7 @@ class ToleranceAssessment:
             "limit_m": self.limit,
             "poses": [
                 {
+                    "number": int(self.numbers[p]),
                     "q": self.q[p].tolist(),
                     "worst_case_m": float(self.worst_case[p]),
                     "statistical_m": float(self.statistical[p]),
@@ -139,18 +150,22 @@ class ToleranceAssessment:
         yield self._dimension_table()
 
     def _summary(self) -> Iterator[tuple[str, str, str]]:
-        yield "worst case, mm", f"{self.worst_case.argmax() + 1}", _mm(self.worst_case.max())
-        yield "statistical, mm", f"{self.worst_pose + 1}", _mm(self.statistical.max())
+        yield "worst case, mm", self._number(self.worst_case), _mm(self.worst_case.max())
+        yield "statistical, mm", self._number(self.statistical), _mm(self.statistical.max())
         mean = self.sampled.mean(axis=0)
-        yield "mean error of sampled arms, mm", f"{mean.argmax() + 1}", _mm(mean.max())
+        yield "mean error of sampled arms, mm", self._number(mean), _mm(mean.max())
         if self.limit is None or self.at_poses is None or self.on_path is None:
             return
         beyond, count = int((self.sampled > self.limit).any(axis=1).sum()), len(self.sampled)
         path = self.on_path
         limit = f"{self.limit * 1e3:g} mm"
-        yield f"P(error > {limit}) at a pose, exact", f"{self.at_poses.argmax() + 1}", f"{self.at_poses.max():.3g}"
+        yield f"P(error > {limit}) at a pose, exact", self._number(self.at_poses), f"{self.at_poses.max():.3g}"
         yield f"P(error > {limit}) at any pose", "", f"{path.probability:.3g} ± {path.standard_error:.1g}"
         yield f"sampled arms beyond {limit}", "", f"{beyond} of {count}"
+
+    def _number(self, values: Array) -> str:
+        """Return the number of the pose with the largest value."""
+        return str(self.numbers[values.argmax()])
 
     def _dimension_table(self) -> ResultTable:
         allocation, shares = self.allocation, self.error.shares[self.worst_pose]
@@ -180,7 +195,7 @@ class ToleranceAssessment:
                 f"given tolerances, all scaled to the same limit, cost {allocation.scaled_cost:.4g}: {saved:.1%} more."
             )
         return ResultTable(
-            title=f"Dimensions, by their share of the variance at pose {self.worst_pose + 1}",
+            title=f"Dimensions, by their share of the variance at pose {self.numbers[self.worst_pose]}",
             heads=tuple(heads),
             rows=tuple(rows),
             numbers=range(1, len(heads)),
@@ -198,6 +213,7 @@ def assess_tolerances(
     samples: int = 1000,
     seed: int = 0,
     uniform: bool = False,
+    most: int = 200,
     progress: Callable[[str], None] | None = None,
 ) -> ToleranceAssessment:
     """Assess what tolerances of an arm's dimensions do to the position of its tool.
@@ -211,6 +227,7 @@ def assess_tolerances(
         samples: how many random arms are drawn, with their full kinematics.
         seed: of all samples.
         uniform: whether the deviations of these are uniform within tolerances, and not normal.
+        most: of more configurations, so many are computed, evenly spread, the first and the last included.
         progress: is told what is being done.
 
     Raises:
@@ -218,19 +235,25 @@ def assess_tolerances(
         InvalidValueError: a number is out of its range, or tolerances of least cost are asked for without a limit.
         TooFewError: there is no configuration, or no tolerance.
     """
-    configurations = np.atleast_2d(joint_array(q, arm.n))
-    if not len(configurations) or not tolerances:
+    every = np.atleast_2d(joint_array(q, arm.n))
+    if not len(every) or not tolerances:
         raise TooFewError("expected a configuration and a tolerance at least")
-    limit = None if limit is None else positive(limit, "limit", "m")
+    rows = np.linspace(0, len(every) - 1, min(len(every), integer(most, "most", least=2))).round().astype(int)
+    configurations = every[rows]
+    if integer(samples, "samples", least=1) * len(rows) > _SAMPLED:
+        raise InvalidValueError(
+            f"samples: expected at most {_SAMPLED // len(rows)} random arms for so many poses, got {samples}"
+        )
+    if limit is not None and not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
+        raise InvalidValueError(f"limit: expected {_LIMITS[0]:g} to {_LIMITS[1]:g} m, got {limit:g}")
     say = progress or (lambda _: None)
     error = tool_error(arm, configurations, tolerances)
     widths = np.array([each.half_width for each in tolerances])
     worst, _ = error_bounds(error, widths, "worst-case")
     statistical, _ = error_bounds(error, widths, "statistical")
     say("random arms")
-    sampled = sampled_errors(
-        arm, configurations, tolerances, samples=integer(samples, "samples", least=1), seed=seed, uniform=uniform
-    )
+    sampled = sampled_errors(arm, configurations, tolerances, samples=samples, seed=seed, uniform=uniform)
+    deviations = sampled_deviations(tolerances, samples=samples, seed=seed, uniform=uniform)
     on_path = at_poses = found = None
     if limit is not None:
         say("probabilities")
@@ -241,17 +264,30 @@ def assess_tolerances(
     return ToleranceAssessment(
         arm=arm,
         q=configurations,
+        numbers=rows + 1,
+        given=len(every),
         tolerances=tuple(tolerances),
         error=error,
         limit=limit,
         worst_case=worst,
         statistical=statistical,
         sampled=sampled,
+        nonlinearity=_nonlinearity(error, deviations, sampled),
         on_path=on_path,
         at_poses=at_poses,
         allocation=found,
         rule=allocation or "worst-case",
     )
+
+
+def _nonlinearity(error: LinearError, deviations: Array, sampled: Array) -> float:
+    # Pose by pose, so that no array is larger than the sampled errors.
+    largest = 0.0
+    for J, full in zip(error.jacobian, sampled.T, strict=True):
+        linear = np.linalg.norm(deviations @ J.T, axis=1)
+        off, length = (float(np.sqrt((x**2).mean())) for x in (full - linear, linear))
+        largest = max(largest, off / max(length, _ROUNDING))
+    return largest
 
 
 def _mm(metres: float) -> str:

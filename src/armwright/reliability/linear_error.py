@@ -140,7 +140,7 @@ class LinearError:
             if not varies.any():
                 continue
             nearest = (nearest_failure(mean, each @ each.T, limit) - mean) @ axes[:, varies] / sizes[varies]
-            ways = np.concatenate([directions[:, varies], nearest[None], -nearest[None]])
+            ways = np.concatenate([directions[:, : len(sizes)][:, varies], nearest[None], -nearest[None]])
             ways = ways[np.linalg.norm(ways, axis=1) > 0]
             ways /= np.linalg.norm(ways, axis=1)[:, None]
             steps = ways * sizes[varies] @ axes[:, varies].T

@@ -8,12 +8,16 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, integer, joint_array, one_or_each, positive
-from armwright.errors import InvalidValueError
+from armwright.arrays import Array, ArrayLike, floats, integer, joint_array, one_or_each, positive, read_only
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.jacobians import jacobian
 
 # Visits of a pose from which its repeatability follows.
 _VISITS = 20_000
+
+
+def _numbers(value: ArrayLike) -> Array:
+    return read_only(floats(value, "wear rates"))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -25,11 +29,13 @@ class WearRates:
         spread: (n,) standard deviation of the logarithm of the growth.
     """
 
-    median: Array
-    spread: Array
+    median: Array = attrs.field(converter=_numbers)
+    spread: Array = attrs.field(converter=_numbers)
 
     def __attrs_post_init__(self) -> None:
         """Refuse rates that no wear has."""
+        if self.median.ndim != 1 or self.median.shape != self.spread.shape:
+            raise ShapeError(f"wear rates: expected (n,) each, got {self.median.shape} and {self.spread.shape}")
         if (self.median < 0).any() or (self.spread < 0).any():
             raise InvalidValueError("wear rates: expected 0 or more")
 
@@ -57,6 +63,8 @@ class PlayLife(NamedTuple):
 
     def quantile(self, part: float) -> float:
         """Return the cycles that this part of the arms does not reach."""
+        if not 0 <= part <= 1:
+            raise InvalidValueError(f"part: expected 0 to 1, got {part:g}")
         return float(np.quantile(self.cycles, part, method="inverted_cdf"))
 
 
@@ -111,6 +119,8 @@ def play_life(
     first, limit = one_or_each(play, arm.n, "play", "joint"), positive(limit, "limit", "m")
     if (first < 0).any():
         raise InvalidValueError("play: expected 0 or more")
+    if len(rates.median) != arm.n:
+        raise ShapeError(f"rates: expected one per joint, {arm.n}, got {len(rates.median)}")
     J = jacobian(arm, configurations)[:, :3]
     drawn = rates.sample(integer(samples, "samples", least=1), np.random.default_rng(seed))
     squares = (J**2).sum(axis=1)  # (p, n)

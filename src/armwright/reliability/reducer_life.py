@@ -41,6 +41,9 @@ class Rating:
         """Refuse what no maker states."""
         for name in ("effort", "speed", "hours", "exponent"):
             positive(getattr(self, name), name)
+        for name in ("average", "peak"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(f"{name}: expected more than 0, got {getattr(self, name):g}")
 
 
 class Load(NamedTuple):

@@ -18,6 +18,10 @@ SIGMAS = 3.0
 _ANGLES = ("theta", "alpha", "beta")
 _LENGTHS = ("d", "a")
 _ENDS = ("base", "tool")
+# A tolerance is at most so large [mm] or [deg]; what is smaller than the least is rounding.
+_LARGEST, _LEAST = {"mm": 1e6, "deg": 180.0}, 1e-9
+# Bounds of the exponent of cost, and of factors.
+_EXPONENTS, _FACTORS = (0.01, 10.0), (1e-9, 1e9)
 
 
 @attrs.frozen(kw_only=True)
@@ -103,7 +107,7 @@ def _joint_keys() -> Iterator[tuple[str, str, float]]:
 
 
 def _dimension_values(table: Table, keys: Iterator[tuple[str, str, float]]) -> dict[str, float]:
-    values = {name: table.number(key, lower=0.0) * unit for name, key, unit in keys if key in table}
+    values = {name: _half_width(table, key) * unit for name, key, unit in keys if key in table}
     table.allow(*(key for _, key, _ in _joint_keys()))
     table.refuse_unknown_keys()
     if "alpha" in values:
@@ -111,16 +115,23 @@ def _dimension_values(table: Table, keys: Iterator[tuple[str, str, float]]) -> d
     return values
 
 
+def _half_width(table: Table, key: str) -> float:
+    value = table.number(key, 0.0, lower=0.0, upper=_LARGEST[key.rpartition("_")[2]])
+    if 0 < value < _LEAST:
+        raise table.error(key, f"expected 0, or {_LEAST:g} or more, got {value:g}")
+    return value
+
+
 def _end_values(table: Table) -> dict[str, float]:
-    position, rotation = (table.number(key, 0.0, lower=0.0) for key in ("position_mm", "rotation_deg"))
+    position, rotation = (_half_width(table, key) for key in ("position_mm", "rotation_deg"))
     table.refuse_unknown_keys()
     lengths = dict.fromkeys("xyz", position * 0.001)
     return {**lengths, **{f"r{axis}": math.radians(rotation) for axis in "xyz"}}
 
 
 def _costs(table: Table) -> tuple[float, Mapping[str, float]]:
-    exponent = table.positive("exponent", 1.0)
+    exponent = table.number("exponent", 1.0, lower=_EXPONENTS[0], upper=_EXPONENTS[1])
     own = table.table("factors")
-    factors = {name: own.positive(name) for name in own}
+    factors = {name: own.number(name, lower=_FACTORS[0], upper=_FACTORS[1]) for name in own}
     table.refuse_unknown_keys()
     return exponent, factors

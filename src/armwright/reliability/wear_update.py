@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, positive
+from armwright.arrays import Array, ArrayLike, floats, not_negative, positive
 from armwright.errors import InvalidValueError, ShapeError
 
 # Points of the grid of the logarithm, and how far it reaches in standard deviations of the prior.
@@ -38,6 +38,8 @@ class RatePosterior(NamedTuple):
 
     def quantile(self, part: float) -> float:
         """Return the rate that is not exceeded with this probability."""
+        if not 0 <= part <= 1:
+            raise InvalidValueError(f"part: expected 0 to 1, got {part:g}")
         total = np.cumsum(self.probabilities) - self.probabilities / 2
         return float(np.exp(np.interp(part, total, np.log(self.rates))))
 
@@ -61,6 +63,7 @@ def updated_rate(
     """
     positive(median, "median")
     positive(spread, "spread")
+    not_negative(first, "first")
     n, p, s = floats(cycles, "cycles"), floats(plays, "plays"), floats(errors, "errors")
     if n.ndim != 1 or n.shape != p.shape or n.shape != s.shape:
         raise ShapeError(f"expected cycles, plays and errors (m,), got {n.shape}, {p.shape} and {s.shape}")

@@ -32,7 +32,12 @@ def longest_sum(generators: Array, offset: Array | None = None, *, exact: bool =
     Source:
         Ziegler (1995), chapter 7: zonotopes and arrangements of hyperplanes.
     """
-    start = np.zeros(len(generators)) if offset is None else offset
+    # In units of the longest of all, products of three of them neither overflow nor vanish.
+    unit = float(np.abs(generators if offset is None else np.column_stack([generators, offset])).max(initial=0.0))
+    if not unit:
+        return 0.0, np.ones(generators.shape[1])
+    generators = generators / unit
+    start = np.zeros(len(generators)) if offset is None else offset / unit
     signs = np.where(np.sign(_spread(generators) @ generators) < 0, -1.0, 1.0)
     for _ in range(_ASCENTS):
         sums = start + signs @ generators.T
@@ -44,7 +49,7 @@ def longest_sum(generators: Array, offset: Array | None = None, *, exact: bool =
         signs = np.concatenate([signs, _corners(generators, both=offset is not None)])
     lengths = np.linalg.norm(start + signs @ generators.T, axis=-1)
     best = int(lengths.argmax())
-    return float(lengths[best]), signs[best]
+    return float(lengths[best]) * unit, signs[best]
 
 
 def _spread(generators: Array) -> Array:
@@ -53,12 +58,15 @@ def _spread(generators: Array) -> Array:
     return np.concatenate([generators.T, -generators.T, axes, -axes])
 
 
-def _corners(G: Array, *, both: bool) -> Array:
-    """Return the factors (c, k) of the corners; of two that are opposite only one, unless both are asked for."""
+def _corners(G: Array, *, both: bool, most: int = 3) -> Array:
+    """Return the factors (c, k) of the corners; of two that are opposite only one, unless both are asked for.
+
+    Generators of a face fill it alone: beyond ``most`` dimensions they reach by rounding only.
+    """
     lengths = np.linalg.norm(G, axis=0)
     small = _ZERO * max(float(lengths.max(initial=0.0)), np.finfo(float).tiny)
     axes, sizes, _ = np.linalg.svd(G, full_matrices=False)
-    rank = int((sizes > small).sum())
+    rank = min(int((sizes > small).sum()), most)
     within = axes[:, :rank].T @ G
     if rank < 2:
         found = np.where(within[:1] < 0, -1.0, 1.0) if rank else np.ones((1, G.shape[1]))
@@ -74,7 +82,7 @@ def _corners(G: Array, *, both: bool) -> Array:
         counts = flat.sum(axis=1)
         simple = counts == rank - 1
         parts = [_of_simple_faces(signs[simple], flat[simple], rank - 1)]
-        parts += [_of_face(G, signs[i], flat[i]) for i in np.flatnonzero(~simple)]
+        parts += [_of_face(G, signs[i], flat[i], rank - 1) for i in np.flatnonzero(~simple)]
         found = np.concatenate(parts)
     return np.concatenate([found, -found]) if both else found
 
@@ -88,9 +96,9 @@ def _of_simple_faces(signs: Array, flat: Array, count: int) -> Array:
     return corners
 
 
-def _of_face(G: Array, signs: Array, flat: Array) -> Array:
+def _of_face(G: Array, signs: Array, flat: Array, count: int) -> Array:
     """Return the factors of the corners of a face, the generators in which are flat."""
-    sides = _corners(G[:, flat], both=True)
+    sides = _corners(G[:, flat], both=True, most=count)
     factors = np.tile(signs, (len(sides), 1))
     factors[:, flat] = sides
     return factors

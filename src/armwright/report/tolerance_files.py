@@ -84,7 +84,7 @@ def _drawings(assessment: ToleranceAssessment) -> Iterator[Drawing]:
 def _errors(assessment: ToleranceAssessment) -> str:
     figure = empty_figure((7.4, 4.0))
     axes = plain_axes(figure, "pose", "error of the tool, mm")
-    poses = np.arange(1, len(assessment.q) + 1)
+    poses = assessment.numbers
     low, high = np.quantile(assessment.sampled, (0.05, 0.95), axis=0) * 1e3
     axes.fill_between(poses, low, high, color="C0", alpha=0.2, label="nine tenths of random arms")
     axes.plot(poses, assessment.worst_case * 1e3, "-", color="C3", label="worst case")
@@ -117,6 +117,8 @@ def _changes(assessment: ToleranceAssessment, allocation: Allocation) -> str:
     values = [float(widths[i] / assessment.tolerances[i].half_width) for i in order]
     _bars(axes, [assessment.tolerances[i].name for i in order], values, start=1.0)
     axes.set_xscale("log")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}" if max(values) < 10 * min(values) else "")
     axes.axvline(1, color="C7", linewidth=1)
     return svg_text(figure, "Tolerances of least cost")
 
