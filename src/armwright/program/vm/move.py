@@ -130,7 +130,7 @@ def _begin_move(
     tracking = None
     if request.tracked is not None:
         stage, tracking = plan_tracking(machine, process, request, (arm, moved), _planner(machine, arm))
-        planned = [(stage, (request.form.goal,))]
+        planned: list[tuple[PlannedStage, tuple[str, ...]]] = [(stage, (request.form.goal,))]
     else:
         planned = _plan_stages(machine, process, request, arm, moved)
     stages = checked_stages(machine, process, request, arm, planned)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.cell.hardware import Mishap
 from armwright.cell.moving_frames import MovingFrame
 from armwright.kinematics.forward_kinematics import forward
@@ -114,7 +116,7 @@ def _in_window(
     now, (low, high) = machine.now, frame.window
     come = frame.travel(np.array([now]))
 
-    def inside(t: Array) -> Array:
+    def inside(t: Array) -> Flags:
         places = place + frame.travel(now + t) - come
         return np.asarray((places >= low - _AT_END) & (places <= high + _AT_END))
 
@@ -135,9 +137,8 @@ def _in_window(
     return begin, None if stands is not None and stands - now < _AHEAD else _AHEAD
 
 
-def _change(inside: object, out: float, within: float) -> float:
+def _change(inside: Callable[[Array], Flags], out: float, within: float) -> float:
     """Return the time in the window next to one outside of it."""
-    assert callable(inside)  # noqa: S101 - for its type
     for _ in range(_HALVINGS):
         middle = (out + within) / 2
         out, within = (out, middle) if inside(np.array([middle]))[0] else (middle, within)
