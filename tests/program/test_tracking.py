@@ -178,6 +178,29 @@ def test_what_is_grasped_comes_along(tmp_path: Path) -> None:
     check_limits(recording)
 
 
+def test_implied_affix(tmp_path: Path) -> None:
+    """A part that was grasped on the belt and not affixed hangs on the arm from its first MOVE on, as one at rest."""
+    cell = belt_cell(tmp_path)
+    text = f"""{START} MOVE ARM_1 TO part WITH TRACKING = belt ; GRASP ARM_1 ; UNFIX part FROM belt ;
+      MOVE part TO part * XYZ(0, 0, -30) WITH TRACKING = belt ; PAUSE 0.2 ; PRINT(DIST(ARM_1, part)) ; END."""
+
+    assert printed(run(Source("t.rlo", text), cell)) == ["0"]
+
+
+def test_a_contact_on_the_way_is_refused(tmp_path: Path) -> None:
+    """An arm that follows goes on when its next MOVE is refused, and stops within its limits."""
+    cell = belt_cell(tmp_path)
+    cell = attrs.evolve(cell, contact=attrs.evolve(cell.contact, height=0.08))
+    recording = ran(
+        """TRY MOVE ARM_1 TO part WITH TRACKING = belt ; MOVE ARM_1 TO part * XYZ(0, 0, 50) WITH TRACKING = belt ;
+        RECOVER (MOTION) PRINT(MESSAGE) END ;""",
+        cell,
+    )
+
+    assert "would enter the plane" in printed(recording)[0]
+    check_limits(recording)
+
+
 def test_the_end_of_the_window(tmp_path: Path) -> None:
     """An arm that follows to the end of the window stops within its limits, and RECOVER goes on from there."""
     cell = belt_cell(tmp_path)

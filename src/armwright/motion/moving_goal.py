@@ -40,6 +40,7 @@ _TRIES, _LONGER, _MUCH_LONGER, _LONGEST = 60, 1.02, 2.0, 120.0
 _REST = (0.2, 0.4, 0.8, 1.6)
 # What is followed less when the arm cannot go as far, and how often.
 _LESS, _SHORTER = 0.9, 40
+_OUT_OF_REACH = "a pose on the way is out of reach"
 
 
 class MovingGoalError(ArmwrightError, ValueError):
@@ -225,9 +226,6 @@ def _shortest_way(solver: Solver, start: Start, goal: CarriedPose, way: Way) -> 
     raise MovingGoalError("a joint would have to move too fast however long the tool is under way")
 
 
-_OUT_OF_REACH = "a pose on the way is out of reach"
-
-
 def _followed(solver: Solver, start: Start, chase: _Chase, cuts: Array) -> Trajectory | _Fault:
     """Return the joints that follow a motion of the tool, or what stops them."""
     inner = [chase.wait, chase.reached, chase.end, *cuts[(cuts > 0) & (cuts < chase.duration)]]
@@ -242,9 +240,8 @@ def _followed(solver: Solver, start: Start, chase: _Chase, cuts: Array) -> Traje
         t = (knots[:-1, None] + np.diff(knots)[:, None] * _LOOKS).ravel()
         X, Y = solver.forward(trajectory(t)), chase(t)
         off = np.linalg.norm(X[:, :3, 3] - Y[:, :3, 3], axis=1) / _NEAR
-        worst = (
-            np.maximum(off, angle_between(X[:, :3, :3], Y[:, :3, :3]) / _TURNED).reshape(-1, len(_LOOKS)).max(axis=1)
-        )
+        turned = angle_between(X[:, :3, :3], Y[:, :3, :3]) / _TURNED
+        worst = np.maximum(off, turned).reshape(-1, len(_LOOKS)).max(axis=1)
         if worst.max() <= 1:
             return _limits_kept(solver, trajectory) or trajectory
         parts = np.where(worst > 1, np.clip(np.ceil(1.1 * worst**0.25), 2, _PARTS), 1).astype(np.intp)

@@ -48,7 +48,7 @@ from armwright.program.vm.moves_ahead import fits, goes_over, merged
 from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
-from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, stop_following
+from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, rest_of_following, stop_following
 from armwright.spatial.poses import inverse
 
 # A pose this many times farther than the arm reaches was probably typed in another unit.
@@ -155,7 +155,6 @@ def _begin_move(
         guards=request.guards,
         tracking=tracking,
     )
-    leave_frame(machine, arm)
     start_stage(machine, process, process.motion)
 
 
@@ -455,11 +454,12 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
         pressed = machine.hardware.peak_contact(motion.arm, machine.now + trajectory.duration)
-        send_trajectory(machine, motion, hold(trajectory(0.0), period))
+        send_trajectory(machine, motion, rest_of_following(machine, motion.arm) or hold(trajectory(0.0), period))
         motion.alarm_tick = None
         refuse_contact(machine, process, motion, goal_names[-1], pressed)
     if touch is not None:
         motion.first_contact = (trajectory, touch - machine.now)
+    leave_frame(machine, motion.arm)
     motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(arm, tau, period)
     machine.state.stages.append(
         RunStage(

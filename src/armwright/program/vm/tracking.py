@@ -14,12 +14,14 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.moving_goal import CarriedPose, MovingGoalError, Start, Way, pursue
 from armwright.motion.plan import PlannedStage, tool_path_length
 from armwright.motion.solver import AnyArm
+from armwright.motion.trajectory import Trajectory
 from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED
 from armwright.program.vm.contact import stop_arm
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.move_request import MoveRequest
 from armwright.program.vm.process import Motion, Process, Tracking
+from armwright.program.vm.recording import peak_efforts
 from armwright.spatial.poses import inverse
 
 # How far ahead a moving frame is looked at, and how closely [s]; halvings of that until a time is exact.
@@ -82,7 +84,8 @@ def plan_tracking(
     stage = PlannedStage(kind="TRACK", trajectory=found.trajectory, length=length)
     follows = None if rests and not found.cut else round(found.end / period)
     X_FT = inverse(frame.pose_at(now)) @ X_WT
-    return stage, Tracking(name, X_FT, round(found.reached / period), follows, found.cut)
+    cut = found.cut or (f"it has done so for {_AHEAD:g} s" if end == _AHEAD else "")
+    return stage, Tracking(name, X_FT, round(found.reached / period), follows, cut)
 
 
 def _start(machine: Machine, arm: str, X_BW: Array) -> Start:
@@ -160,9 +163,20 @@ def leave_frame(machine: Machine, arm: str) -> None:
     local = machine.now - runs[-1].t0
     done = runs[-1].trajectory.until(local)
     runs[-1] = attrs.evolve(runs[-1], duration=local)
-    stage = machine.state.stages[motion.stage_index]
-    length = tool_path_length(machine.cell.arms[arm].arm, done)
+    stage, model = machine.state.stages[motion.stage_index], machine.cell.arms[arm].arm
+    length, tau = tool_path_length(model, done), runs[-1].tau
+    if tau is not None:
+        peak, when = peak_efforts(model, tau[: round(local / machine.cell.period) + 1], machine.cell.period)
+        stage = attrs.evolve(stage, peak_effort=peak, peak_time=when)
     machine.state.stages[motion.stage_index] = attrs.evolve(stage, motion=done, length=length)
+
+
+def rest_of_following(machine: Machine, arm: str) -> Trajectory | None:
+    """Return how an arm goes on that follows a frame; None where it follows none."""
+    if arm not in machine.state.following:
+        return None
+    run = machine.state.segments[arm][-1]
+    return run.trajectory.after(machine.now - run.t0)
 
 
 def stop_following(machine: Machine, process: Process, arm: str, span: Span) -> int:
