@@ -383,7 +383,7 @@ FAULTS = {
     "a misspelt key of a frame": (
         ARM + f"[frames.A]\nat = {IDENTITY}\nparent = 'WORLD'\n",
         6,
-        "frames, A, parent: unknown key; known keys: at, on",
+        "frames, A, parent: unknown key; known keys: at, moves, on",
     ),
     "a vision that is not a list of poses": (
         ARM + f"[visions]\nA = {IDENTITY}\n",

@@ -21,7 +21,7 @@ TABLE = {
 }
 
 DECLARED = """
-VAR a, b, c : FRAME ; n : SCALAR ; e : EVENT ;
+VAR a, b, c, belt : FRAME ; n : SCALAR ; e : EVENT ;
 PROCEDURE away ; BEGIN MOVE ARM_1 TO a * XYZ(0, 0, -0.05) END ;
 BEGIN
   a = (1,0,0, 0,-1,0, 0,0,-1, 0.40, 0.15,0.20) ;
@@ -60,6 +60,7 @@ PROGRAMS = {
     "AFFIX, UNFIX, frames": "AFFIX c TO b ; b = b * XYZ(0, 0, 0.02) ; MOVE ARM_1 TO c STRAIGHTLY ; UNFIX c FROM b ;",
     "READ VISIONS": "READ VISIONS (c) ; MOVE ARM_1 TO c ;",
     "TRY, RECOVER": "TRY MOVE ARM_1 TO a * XYZ(5, 0, 0) RECOVER MOVE ARM_1 TO b END ;",
+    "MOVE with TRACKING": "MOVE ARM_1 TO b * XYZ(0, 0, -0.01) WITH TRACKING = belt ;",
     "MOVE with ON": "MOVE ARM_1 TO c STRAIGHTLY, ON DIST(ARM_1, c) < 0.05 DO HALT ;",
     "WHEN, BRAKE, RESUME": "WHEN DIST(ARM_1, c) < 0.05 DO BEGIN BRAKE ; RESUME END ; MOVE ARM_1 TO c STRAIGHTLY ;",
     "ZERO FORCE": "ZERO FORCE ARM_1 ;",
@@ -91,6 +92,10 @@ def cell_text(name: str) -> str:
     convention = re.search(r"controller = .*", text)
     assert model is not None
     second = f"""
+[frames.BELT]
+at = [1, 0, 0,  0, 1, 0,  0, 0, 1,  0.4, 0, 0.1]
+moves = {{ speed_mm_per_s = 10, window_mm = [-500, 500] }}
+
 [arms.ARM_2]
 {model[0]}
 {convention[0] if convention else ""}

@@ -25,7 +25,8 @@ CELLS = {
 DECLARED = """
 UNITS MM ;
 RECORD part ; weight : SCALAR ; place : FRAME ; END ;
-VAR item : ARRAY [2] OF part ; a, b, c : FRAME ; slot : ARRAY [2] OF FRAME ; n : SCALAR ; note : TEXT ; flag : BOOLEAN ;
+VAR item : ARRAY [2] OF part ; a, b, c, belt : FRAME ; slot : ARRAY [2] OF FRAME ; n : SCALAR ;
+    note : TEXT ; flag : BOOLEAN ;
 PROCEDURE visit(f : FRAME) ; BEGIN MOVE ARM_1 TO f END ;
 FUNCTION beside(f : FRAME) : FRAME ; BEGIN RETURN f * XYZ(n, 0, 0) END ;
 BEGIN
@@ -59,6 +60,7 @@ PROGRAMS = {
     "PRINT of texts and numbers": 'PRINT("n", n) ;',
     "READ VISIONS": "READ VISIONS (c) ; MOVE ARM_1 TO c ;",
     "HALT": "HALT ;",
+    "MOVE with TRACKING": "MOVE ARM_1 TO b * XYZ(0, 0, -10) WITH TRACKING = belt ;",
     "MOVE with ON": "MOVE ARM_1 TO b STRAIGHTLY, ON DIST(ARM_1, b) < 5 DO HALT ;",
     "OPEN to a width": "OPEN ARM_1 TO 40mm ;",
     "TRY, RECOVER, RAISE": "TRY RAISE odd ; RECOVER PAUSE 0.1 ; END ;",
@@ -78,7 +80,11 @@ def cell(target: str, folder: Path) -> Cell:
     text = CELLS[target].read_text(encoding="utf-8")
     text = re.sub(r'model = "(\w+\.toml)"', lambda found: f'model = "{EXAMPLES / found[1]}"', text)
     path = folder / f"{target}.toml"
-    path.write_text(text.replace("[visions]", "[visions]\nC = [[1,0,0, 0,-1,0, 0,0,-1, 0.40,0.06,0.16]]"), "utf-8")
+    belt = (
+        "[frames.BELT]\nat = [1,0,0, 0,1,0, 0,0,1, 0.4,0,0.1]\nmoves = { speed_mm_per_s = 10, window_mm = [-500, 500] }"
+    )
+    seen = "C = [[1,0,0, 0,-1,0, 0,0,-1, 0.40,0.06,0.16]]"
+    path.write_text(text.replace("[visions]", f"{belt}\n\n[visions]\n{seen}"), "utf-8")
     return read_cell(path)
 
 

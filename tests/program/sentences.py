@@ -21,7 +21,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "PULSE": ("PULSE", "pulse"),
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
-    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration"),
+    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration", "TRACKING"),
     "CIRCULARLY": ("CIRCULARLY", "circularly"),
     "WITHIN": ("WITHIN", "within"),
     "TIMER": ("TIMER", "timer"),

@@ -155,8 +155,8 @@ def test_listing_of_names_and_numbers() -> None:
 
 
 def test_trajectories() -> None:
-    """There are the three basic trajectories of the report, one with rounded corners, and arcs."""
-    assert [kind.value for kind in MotionKind] == ["PTP", "LINE", "SPLINE", "BLEND", "ARC"]
+    """There are the three basic trajectories of the report, one with rounded corners, arcs, and to what moves."""
+    assert [kind.value for kind in MotionKind] == ["PTP", "LINE", "SPLINE", "BLEND", "ARC", "TRACK"]
 
 
 @pytest.mark.parametrize(

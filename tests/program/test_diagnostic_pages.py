@@ -73,6 +73,8 @@ def test_run_time_pages_run() -> None:
         "E405",
         "E406",
         "E407",
+        "E408",
+        "E409",
         "E504",
         "E505",
         "E506",

@@ -11,6 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, read_only
 from armwright.cell.control import Alarms, ForceSensor, Sensors, Servo
 from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.cell.moving_frames import MovingFrame
 from armwright.cell.outputs import Controller, Device, Output
 from armwright.cell.scene import Camera, Fixture, Gripper, Marker, Part, Sight, Spread
 from armwright.cell.signals import Input
@@ -124,6 +125,7 @@ class Cell:
         arms: by name, such as ``ARM_1``; the gravity of each model is that of the cell, along the axes of its base.
         gravity: (3,) acceleration of free fall along the axes of the world [m/s²].
         frames: by name, in upper case.
+        moving_frames: how those of the frames move that do so by themselves, by name.
         joint_targets: configurations of arms by name, in upper case; no frame has such a name.
         spreads: how far from where programs believe it a frame, and what stands on it, may be in a world, by name.
         fixtures: bodies that stand where they are, by name.
@@ -154,6 +156,7 @@ class Cell:
     arms: Mapping[str, CellArm]
     gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_as_gravity)
     frames: Mapping[str, Node] = attrs.field(factory=dict)
+    moving_frames: Mapping[str, MovingFrame] = attrs.field(factory=dict)
     joint_targets: Mapping[str, JointTarget] = attrs.field(factory=dict)
     spreads: Mapping[str, Spread] = attrs.field(factory=dict)
     fixtures: Mapping[str, Fixture] = attrs.field(factory=dict)

@@ -18,6 +18,8 @@ from armwright.cell.control_reader import read_alarms, read_force_sensor, read_p
 from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, read_spread, refuse_too_many
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Around, Cell, CellArm, ContactPlane, JointTarget
+from armwright.cell.moving_frames import MovingFrame
+from armwright.cell.moving_frames_reader import read_moving_frame
 from armwright.cell.names import arm_name
 from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
@@ -90,7 +92,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     arms = _read_arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
     top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
-    frames, spreads = _read_frames(top.table("frames"), arms)
+    frames, spreads, moves = _read_frames(top.table("frames"), arms)
     standing = _standing(frames, arms)
     scene = top.table("scene")
     fixtures, markers = read_fixtures(scene, standing), read_markers(scene)
@@ -104,6 +106,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         arms=arms,
         gravity=_read_gravity(top),
         frames=frames,
+        moving_frames=_read_moving_frames(moves, frames, standing),
         joint_targets=_read_joint_targets(top.table("joint_targets"), arms, frames),
         spreads=spreads,
         fixtures=fixtures,
@@ -267,12 +270,13 @@ def _read_start(table: Table, arm: Arm, base: Array) -> Array:
     return solution.best.q
 
 
-def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], dict[str, Spread]]:
-    """Read the frames, and how far from there those may be that have a spread."""
+def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], dict[str, Spread], dict[str, Table]]:
+    """Read the frames, how far from there those may be that have a spread, and the tables of those that move."""
     refuse_too_many(table, "frames")
     frames: dict[str, Node] = {}
     spreads: dict[str, Spread] = {}
     entries: dict[str, Table] = {}
+    moves: dict[str, Table] = {}
     for key in table:
         name = read_name(table, key, frames)
         if table.is_table(key):
@@ -281,6 +285,9 @@ def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], di
             frames[name] = Node(parent=parent, relation=read_pose(entry, "at"))
             if (spread := read_spread(entry, "spread_mm", "spread_deg", "tilt_deg")) != Spread():
                 spreads[name] = spread
+            if "moves" in entry:
+                moves[name] = entry.table("moves")
+            entry.allow("moves")
             entry.refuse_unknown_keys()
         else:
             frames[name] = Node(parent=WORLD, relation=read_pose(table, key))
@@ -300,7 +307,19 @@ def _read_frames(table: Table, arms: Iterable[str]) -> tuple[dict[str, Node], di
             raise entry.error("on", f"{name} is too deep in the frame tree: {limit_message('hanging')}")
         if name in spreads and (arm := frames[path[-1]].parent) in arms:
             raise entry.error(None, f"{name} moves with {arm}; only a frame that stands can have a spread")
-    return frames, spreads
+    return frames, spreads, moves
+
+
+def _read_moving_frames(
+    moves: Mapping[str, Table], frames: Mapping[str, Node], standing: FrameTree
+) -> dict[str, MovingFrame]:
+    """Read how frames move, which hang on nothing that moves."""
+    depth = limit("hanging")
+    for name, entry in moves.items():
+        below = [*_path_to_root(name, frames, depth)[1:]]
+        if name not in standing or any(parent in moves for parent in below):
+            raise entry.error(None, f"{name} moves by itself, so what it is on must stand")
+    return {name: read_moving_frame(entry, standing.world(name)) for name, entry in moves.items()}
 
 
 def _read_joint_targets(table: Table, arms: Mapping[str, CellArm], frames: Collection[str]) -> dict[str, JointTarget]:

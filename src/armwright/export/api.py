@@ -26,7 +26,7 @@ from armwright.export.checkers.joint_tables import compare_counts, compare_traje
 from armwright.export.checkers.program_comparison import compare_run
 from armwright.export.conventions import Convention
 from armwright.export.events import events_file
-from armwright.export.plan_mode import fixed_notes, plan_statements, refuse_guards
+from armwright.export.plan_mode import fixed_notes, plan_statements, refuse_guards, refuse_tracking
 from armwright.export.proof import Comparison, Proof
 from armwright.export.targets import Mode, Target
 from armwright.export.translation.expected import expected
@@ -203,6 +203,7 @@ def _language(target: Target, recording: Recording, name: str) -> tuple[dict[str
 
 def _tables(target: Target, recording: Recording) -> tuple[dict[str, str], Proof]:
     """Return the files of a target that takes joint positions in time, one arm after the other."""
+    refuse_tracking(recording)
     refuse_guards(recording)
     files: dict[str, str] = {}
     comparisons: list[Comparison] = []

@@ -58,6 +58,7 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
         ExportError: the run has what a controller cannot repeat without it: a guarded MOVE, branches that work at the
             same time, a second arm, a device without an output, an arm without a convention.
     """
+    refuse_tracking(recording)
     refuse_guards(recording)
     arm_name = only_arm(recording)
     _refuse_parallel(recording)
@@ -151,6 +152,19 @@ def refuse_guards(recording: Recording) -> None:
             text = "a WAIT UNTIL ends when its condition holds, and a planned motion goes on at the same time always"
             helps = ["write PAUSE, or export the parts of the program before and behind it"]
             raise refusal(source, "E611", text, effect.span, "a condition is waited for", helps=helps)
+
+
+def refuse_tracking(recording: Recording) -> None:
+    """Refuse a run with a MOVE that tracks a frame.
+
+    Raises:
+        ExportError: it has one.
+    """
+    for stage in recording.stages:
+        if stage.stage.kind == "TRACK":
+            text = "a frame that moves is tracked by the controller itself, and a planned motion is always the same"
+            helps = ["export the parts of the program before and behind it"]
+            raise refusal(recording.code.source, "E611", text, stage.span, "a frame is tracked here", helps=helps)
 
 
 def only_arm(recording: Recording) -> str:

@@ -78,9 +78,27 @@ def _translated(compiled: Compilation, recording: Recording, arm: str, *, keeps_
     )
     if keeps_hand:
         context.declare(arm, "pose", initial=Pose(cell.tree().world(arm)))
+    _refuse_moving_frames(context)
     _constants(context)
     context.translate(*compiled.whole.statements)
     return context
+
+
+def _refuse_moving_frames(context: Context) -> None:
+    """Refuse a program that uses a frame which moves by itself.
+
+    Raises:
+        ExportError: it does.
+    """
+    code = context.compiled.code
+    if code is None or not context.cell.moving_frames:
+        return
+    for step in code.instructions:
+        if found := context.cell.moving_frames.keys() & {one for one in step.operands if isinstance(one, str)}:
+            text = (
+                f"`{code.spelled(min(found))}` moves by itself, and what moves it has no counterpart that is known here"
+            )
+            context.refuse(step.span, text, "a frame that moves", "let the controller track its conveyor")
 
 
 def _constants(context: Context) -> None:

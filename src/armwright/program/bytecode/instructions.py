@@ -124,6 +124,7 @@ class Op(enum.StrEnum):
     MVVEL = "MVVEL", "N"  # number: largest speed of the tool point
     MVROT = "MVROT", "N"  # number: largest angular speed of the tool
     MVACC = "MVACC", "N"  # number: largest change of the speed of the tool point
+    MVTRK = "MVTRK", "F"  # frame of the cell that moves: its goal goes with that
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
@@ -167,7 +168,7 @@ class Op(enum.StrEnum):
 MOVE_PARTS = frozenset(
     (
         *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
-        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVON),
+        *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVTRK, Op.MVON),
     )
 )
 
@@ -213,7 +214,8 @@ class MotionKind(enum.StrEnum):
     ``PTP``: all joints at once, at rest at both ends. ``LINE``: the moved frame on a straight line.
     ``SPLINE``: past frames without a stop, at rest at the last; straight between corners that are rounded as far as
     the cell allows, or through the frames by the report's X-spline in RLO-83. ``BLEND``: the same, rounded from a
-    distance on that the program tells. ``ARC``: the moved frame on an arc of a circle through a frame.
+    distance on that the program tells. ``ARC``: the moved frame on an arc of a circle through a frame. ``TRACK``: to a
+    frame that moves, and on with it.
     """
 
     PTP = "PTP"
@@ -221,6 +223,7 @@ class MotionKind(enum.StrEnum):
     SPLINE = "SPLINE"
     BLEND = "BLEND"
     ARC = "ARC"
+    TRACK = "TRACK"
 
 
 @attrs.frozen(kw_only=True)
@@ -236,6 +239,7 @@ class Form:
         blend: whether the corners at via points are rounded.
         circular: one arc through what lies on the way.
         jointwise: the joints go straight from one configuration to the next, and past what lies on the way.
+        tracking: the goal goes with a frame that moves.
     """
 
     goal: str
@@ -246,6 +250,7 @@ class Form:
     blend: bool = False
     circular: bool = False
     jointwise: bool = False
+    tracking: bool = False
 
     @property
     def direct(self) -> bool:
@@ -267,6 +272,8 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
     Source:
         TR-83-008, third paper: twelve forms of MOVE; approach and departure together by the same logic.
     """
+    if form.tracking:
+        return (StagePlan(kind=MotionKind.TRACK, frames=(form.goal,)),)
     stages = []
     if form.departure:
         stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.departure,)))

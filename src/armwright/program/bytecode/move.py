@@ -23,6 +23,7 @@ _CLAUSES: dict[type, Op] = {
     tree.Velocity: Op.MVVEL,
     tree.Rotation: Op.MVROT,
     tree.Acceleration: Op.MVACC,
+    tree.Tracking: Op.MVTRK,
 }
 
 
@@ -96,6 +97,7 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
         straight=tree.Straightly in clauses,
         blend=tree.Blend in clauses,
         circular=tree.Circularly in clauses,
+        tracking=tree.Tracking in clauses,
     )
 
 

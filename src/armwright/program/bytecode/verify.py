@@ -93,6 +93,7 @@ _OF_CONDITIONS = {op for op in Op if _SIGNATURES[op].result} | {Op.COPY, Op.MUL,
 # All that a function may do.
 _OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RAISE, Op.RETV, Op.NORET}
 # The parts of a MOVE of which an arc has only two.
+_TOOL_LIMITS = {Op.MVVEL, Op.MVROT, Op.MVACC}
 _WAYS = {Op.MVSTR, Op.MVCIR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVBLD, Op.MVJNT, Op.MVTGT}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
@@ -180,6 +181,8 @@ def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
             yield CodeError(number, "expected the parts of a MOVE in sequence, from MVBEG to MVEND")
         if op is Op.MVCIR and not _is_arc(code, number):
             yield CodeError(number, "expected MVCIR with one frame in MVVIA, and without MVSTR, MVDEP, MVAPP and MVBLD")
+        if op is Op.MVTRK and _parts_of(code, number) & (_WAYS - {Op.MVSTR} | _TOOL_LIMITS):
+            yield CodeError(number, "expected MVTRK without another way to go and without limits of the tool")
         if number in targets and before in MOVE_PARTS | {Op.MVBEG, Op.FORK}:
             yield CodeError(number, "a jump must not lead into the middle of a MOVE or of FORKs")
         before = op
@@ -194,6 +197,16 @@ def _is_arc(code: Code, number: int) -> bool:
         last += 1
     parts = [step for step in code.instructions[first : last + 1] if step.op in _WAYS]
     return [(step.op, len(step.operands)) for step in parts] == [(Op.MVCIR, 0), (Op.MVVIA, 1)]
+
+
+def _parts_of(code: Code, number: int) -> set[Op]:
+    """Return the parts of the MOVE that an instruction is one of."""
+    first = last = number
+    while code.instructions[first - 1].op in MOVE_PARTS:
+        first -= 1
+    while code.instructions[last].op in MOVE_PARTS:
+        last += 1
+    return {step.op for step in code.instructions[first:last]}
 
 
 def _wrong_ends(code: Code) -> Iterator[CodeError]:

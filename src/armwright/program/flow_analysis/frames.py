@@ -38,8 +38,23 @@ def assign(state: FlowState, node: tree.Assign) -> None:
         state.set_number(name, None, node.span)
 
 
+def is_moved_by_cell(state: FlowState, frame: str, span: Span) -> bool:
+    """Whether the cell moves a frame, which is reported: it cannot be placed or attached."""
+    if state.cell is None or frame not in (state.cell.moving or ()):
+        return False
+    name = state.name(frame)
+    text, advice = (
+        f"`{name}` is moved by the cell, and cannot be placed or attached",
+        f"affix another frame to `{name}`",
+    )
+    state.report("E249", text, span, "moves by itself", advice=advice)
+    return True
+
+
 def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:
-    """Record the pose of a frame; report one that is rigidly affixed to an arm or WORLD."""
+    """Record the pose of a frame; report one that is rigidly affixed to an arm or WORLD, or moves by itself."""
+    if is_moved_by_cell(state, frame, span):
+        return
     if is_arm(frame) or frame == WORLD:
         return
     root = frame if is_any_element(frame) else state.table.rigid_root(frame)
@@ -65,7 +80,7 @@ def affix(state: FlowState, node: tree.Affix) -> None:
     else:
         require_indices(state, node.child)
     require_value(state, node.at, node.parent)
-    if child is None or is_arm(child) or child == WORLD:
+    if child is None or is_arm(child) or child == WORLD or is_moved_by_cell(state, child, node.span):
         return
     if parent is None:
         state.table.forget(child)
@@ -138,7 +153,7 @@ def unfix(state: FlowState, node: tree.Unfix) -> None:
     state.note_arms(node.parent)
     require_indices(state, node.child, node.parent)
     child, table = state.frame(node.child), state.table
-    if child is None or is_arm(child) or child == WORLD:
+    if child is None or is_arm(child) or child == WORLD or is_moved_by_cell(state, child, node.span):
         return
     parent = state.frame(node.parent)
     if node.parent is not None and parent is not None and not is_any_element(child):

@@ -58,6 +58,8 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
             _check_speed(state, clause.value)
         elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
             require_value(state, clause.value)
+        elif isinstance(clause, tree.Tracking):
+            _check_tracking(state, clause)
     if arm is None:
         return None
     _warn_of_released_frame(state, node, arm)
@@ -194,6 +196,20 @@ def _check_joints(state: FlowState, goal: tree.Function, arm: str | None) -> Non
             if dimension(argument.unit) != kind:
                 text = f"joint {number} of {arm} {verb}, but `{argument.text}` is no {kind}"
                 state.report("E246", text, argument.span, f"expected {'an' if kind == 'angle' else 'a'} {kind}")
+
+
+def _check_tracking(state: FlowState, clause: tree.Tracking) -> None:
+    """Check that a frame which is tracked moves, as far as the cell says so."""
+    frame = state.frame(clause.point)
+    if frame is None or state.cell is None or state.cell.moving is None or frame in state.cell.moving:
+        require_value(state, clause.point)
+        return
+    if not isinstance(clause.point, tree.Name) or state.now.scope.is_poisoned(clause.point.key):
+        return
+    note = f"frames of the cell that move: {', '.join(sorted(state.cell.moving)) or 'none'}"
+    text = f"`{state.name(frame)}` is no frame of the cell that moves"
+    advice = did_you_mean(closest(frame, state.cell.moving))
+    state.report("E249", text, clause.point.span, "nothing to track", note=note, advice=advice)
 
 
 def _check_speed(state: FlowState, node: tree.Expression) -> None:

@@ -69,7 +69,7 @@ HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE", "RECORD")
 PARAMETER_MODES = ("IN", "INOUT")
 # Clauses of MOVE that are words only where a clause may begin.
 PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
-WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION")
+WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION", "TRACKING")
 # What starts a statement only in front of a name.
 STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE", "TIMER")
 # What starts a statement only in front of a text.

@@ -87,15 +87,22 @@ _CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAU
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
-    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
+    "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "TRACKING")),
     "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
-    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND")),
-    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY")),
-    **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY"))),
-    "BLEND": frozenset(("CIRCULARLY",)),
+    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND", "TRACKING")),
+    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY", "TRACKING")),
+    **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "TRACKING"))),
+    "BLEND": frozenset(("CIRCULARLY", "TRACKING")),
     "SPEED": frozenset(("DURATION", "VELOCITY")),
     "DURATION": frozenset(("SPEED", "VELOCITY")),
-    "VELOCITY": frozenset(("SPEED", "DURATION")),
+    "VELOCITY": frozenset(("SPEED", "DURATION", "TRACKING")),
+    **dict.fromkeys(("ROTATION", "ACCELERATION"), frozenset(("TRACKING",))),
+    "TRACKING": frozenset(
+        (
+            *("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND"),
+            *("VELOCITY", "ROTATION", "ACCELERATION"),
+        )
+    ),
 }
 
 

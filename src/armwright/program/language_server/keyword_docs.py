@@ -108,8 +108,8 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION = value",
-        "Specifies approach, departure, speed, rounding of corners, duration, or limits of the tool.",
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION | TRACKING = value",
+        "Specifies approach, departure, speed, rounding of corners, duration, limits of the tool, or a frame to track.",
     ),
     "APPROACH": ("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
     "DEPARTURE": ("WITH DEPARTURE = pose", "Leaves the start in a straight line to this pose."),
@@ -130,6 +130,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "ACCELERATION": (
         "WITH ACCELERATION = length",
         "In each second the speed of the tool point changes by this length per second at most.",
+    ),
+    "TRACKING": (
+        "WITH TRACKING = frame",
+        "The goal goes with a frame of the cell that moves; the arm comes to it, and follows it until its next MOVE.",
     ),
     # control
     "IF": (_IF, "Chooses between two statements."),

@@ -24,6 +24,7 @@ class KnownCell:
         visions: frames that the camera has an answer for; None when nothing is known of the camera.
         reach: of the arm that reaches farthest [m]; None when that is not known.
         joints: of each arm whose joints are known a letter for each, R for one that turns and P for one that slides.
+        moving: the frames that move by themselves; None when nothing is known of them.
         targets: the joint targets, each with its arm; None when nothing is known of them.
     """
 
@@ -36,6 +37,7 @@ class KnownCell:
     reach: float | None = None
     joints: Mapping[str, str] = attrs.field(factory=dict)
     targets: Mapping[str, str] | None = None
+    moving: frozenset[str] | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -80,6 +82,7 @@ def known_cell(cell: Cell) -> KnownCell:
         reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
         joints={name: "".join("RP"[not it.revolute] for it in arm.arm.joints) for name, arm in cell.arms.items()},
         targets={name: target.arm for name, target in cell.joint_targets.items()},
+        moving=frozenset(cell.moving_frames),
     )
 
 

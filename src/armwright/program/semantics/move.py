@@ -41,10 +41,10 @@ def move(context: Context, node: tree.Move) -> None:
                 _check_pose(names, point, "E215", f"{article} point must be a FRAME")
             case tree.Speed(value=value):
                 _check_speed(names, value)
-            case tree.Blend(value=value) | tree.Duration(value=value):
-                _check_quantity(names, clause, value)
-            case tree.Velocity(value=value) | tree.Rotation(value=value) | tree.Acceleration(value=value):
-                _check_quantity(names, clause, value)
+            case tree.Blend() | tree.Duration() | tree.Velocity() | tree.Rotation() | tree.Acceleration():
+                _check_quantity(names, clause, clause.value)
+            case tree.Tracking(point=point):
+                _check_tracking(names, node, clause, point)
             case tree.On(condition=wanted, action=action, head=head):
                 _check_guard_place(names, node, head)
                 require_condition(names, wanted, "ON")
@@ -64,6 +64,30 @@ def _check_pose(
         return f"to move by `{step}` from the present pose write `MOVE {moved} TO {moved} * {step}`"
 
     require_type(names, node, ExpressionType.FRAME, code, what, advice=advice)
+
+
+# What a goal that goes with a moving frame has nothing to do with: the tool goes there straight, and on with it.
+_CONFLICTS_WITH_TRACKING = (
+    *(tree.Directly, tree.Circularly, tree.Via, tree.Approach, tree.Departure, tree.Blend),
+    *tree.TOOL_LIMITS,
+)
+
+
+def _check_tracking(names: NameResolver, node: tree.Move, clause: tree.Clause, frame: tree.Expression) -> None:
+    """Check a MOVE that tracks a frame: it names one, and does nothing else on its way."""
+    is_frame = require_type(names, frame, ExpressionType.FRAME, "E215", "TRACKING needs a frame that moves")
+    if is_frame and not isinstance(frame, tree.Name | tree.Poison):
+        text = f"TRACKING needs the name of a frame that moves, not {quote_expression(frame)}"
+        advice = "affix what the MOVE goes to to that frame, and name the frame here"
+        names.report("E248", text, frame.span, "this is no name of a frame", advice=advice)
+    if isinstance(node.goal, tree.Function) and is_joints(names.scope, node.goal):
+        text, here = "joint positions do not go with a frame", labels(clause.span, "a frame is tracked here")
+        names.report("E248", text, node.goal.span, "these stand", secondary=here, advice="leave TRACKING out")
+    for other in node.clauses:
+        if isinstance(other, _CONFLICTS_WITH_TRACKING):
+            text = f"TRACKING cannot be combined with {tree.clause_word(type(other))}"
+            here, advice = labels(clause.span, "a frame is tracked here"), "write a MOVE of its own for the other leg"
+            names.report("E248", text, other.span, "another way, or another speed", secondary=here, advice=advice)
 
 
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.

@@ -20,7 +20,7 @@ _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Pri
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
 _VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     tree.clause_word(kind): kind
-    for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS)
+    for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS, tree.Tracking)
 }
 _CLAUSES_IN_CONTEXT = (*PLAIN_CLAUSES_IN_CONTEXT, *WITH_CLAUSES_IN_CONTEXT)
 
@@ -90,7 +90,7 @@ def _starts_clause(tokens: TokenStream) -> bool:
 # clause = "DIRECTLY" | "STRAIGHTLY" | "CIRCULARLY"
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
-#        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" ) "=" expr
+#        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" | "TRACKING" ) "=" expr
 #        | "ON" expr "DO" action ;
 def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""
@@ -169,7 +169,7 @@ def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
 
 def _valued_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause:
     expect_equals(tokens, f"`WITH {key}`", f"WITH {key}")
-    wants = "a pose" if key in ("APPROACH", "DEPARTURE") else "a value"
+    wants = "a pose" if key in ("APPROACH", "DEPARTURE", "TRACKING") else "a value"
     return tokens.node(_VALUED_CLAUSES[key], start, expression(tokens, wants, f"after {key} ="))
 
 

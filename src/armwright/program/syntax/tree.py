@@ -205,6 +205,13 @@ class Acceleration(Node):
 
 
 @attrs.frozen
+class Tracking(Node):
+    """``WITH TRACKING = frame``: a frame of the cell that moves, with which the goal goes."""
+
+    point: Expression
+
+
+@attrs.frozen
 class On(Node):
     """``ON condition DO action``; ``head`` reaches from ON to the end of the condition."""
 
@@ -226,6 +233,7 @@ Clause: TypeAlias = (
     | Velocity
     | Rotation
     | Acceleration
+    | Tracking
     | On
 )
 # Clauses that limit the tool.

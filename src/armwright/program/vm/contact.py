@@ -52,7 +52,8 @@ def stop_arm(machine: Machine, process: Process, span: Span) -> int:
 
 def rest_tick(machine: Machine, arm: str | None) -> int:
     """Return when an arm is at rest that nobody moves [ticks]: it may still brake after an error that was recovered."""
-    runs = machine.state.segments.get(arm, ()) if arm is not None and machine.moving_process(arm) is None else ()
+    is_busy = arm is None or arm in machine.state.following or machine.moving_process(arm) is not None
+    runs = () if arm is None or is_busy else machine.state.segments.get(arm, ())
     end = math.ceil((runs[-1].t0 + runs[-1].duration) / machine.cell.period - _ROUNDING) if runs else 0
     return max(end, machine.state.ticks)
 

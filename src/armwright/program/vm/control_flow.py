@@ -19,6 +19,7 @@ from armwright.program.vm.process import (
     WaitReason,
 )
 from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
+from armwright.program.vm.tracking import stop_all_following
 from armwright.program.vm.wait_until import too_late, wait_until, wait_within
 from armwright.program.vm.watches import WATCHES, abandon_interrupted
 
@@ -67,7 +68,8 @@ def _join(machine: Machine, process: Process, step: Instruction) -> None:
     process.waiting = WaitReason("branches", (), step.span, machine.next_start())
 
 
-def _quit(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _quit(machine: Machine, process: Process, step: Instruction) -> None:
+    stop_all_following(machine, process, step.span)
     end_process(machine, process)
     parent = process.parent
     assert parent is not None  # noqa: S101 - only branches end so
@@ -175,9 +177,10 @@ def _stop_motion(machine: Machine, process: Process, span: Span, inside: int = 0
         # They have not begun, though the program has taken the arm for being at their goal.
         arm, process.ahead = process.ahead.arm, None
         machine.update_hand_pose(arm, span)
+    followed = stop_all_following(machine, process, span)
     motion = process.motion
     if motion is None or any(one.kind == "watch" for one in process.stack[motion.stack_depth : inside]):
-        return rest_tick(machine, process.last_arm)
+        return max(followed, rest_tick(machine, process.last_arm))
     end = stop_arm(machine, process, span)
     record_contact(machine, motion, end)
     contact_text, contact = contact_report(motion)
@@ -186,7 +189,7 @@ def _stop_motion(machine: Machine, process: Process, span: Span, inside: int = 0
     motion.early_end, since = motion.early_end or EarlyEnd.BRAKED, motion.start
     data = {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", motion.trace_text, motion.span, since=since, until=end, arm=arm, data=data)
-    return end
+    return max(end, followed)
 
 
 def finish_program(machine: Machine, process: Process, span: Span, word: str) -> None:

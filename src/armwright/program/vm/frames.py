@@ -19,6 +19,7 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
         text = "an arm cannot be affixed to a frame" if is_arm(child) else f"`{WORLD}` cannot be affixed"
         code = "E308" if is_arm(child) else "E309"
         raise machine.error(process, code, text, step.span, "cannot be attached to a frame")
+    machine.require_placeable(process, child, step.span)
     if is_arm(parent):
         process.last_arm = parent
     step_X = machine.read_pose(process, operands[2], step.span) if step.op is Op.AFFAT else None
@@ -44,6 +45,7 @@ def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
     if is_arm(child) or child == WORLD:
         code, text = "E308" if is_arm(child) else "E309", f"`{spelled(child)}` cannot be unfixed"
         raise machine.error(process, code, text, step.span, "has no parent")
+    machine.require_placeable(process, child, step.span)
     machine.slot_value(process, child, step.span)
     parent_name = machine.state.tree.parent(child)
     if len(step.operands) > 1 and (parent := machine.resolve_name(process, step.operands[1])) != parent_name:

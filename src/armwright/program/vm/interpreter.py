@@ -29,6 +29,7 @@ from armwright.program.vm.moves_ahead import is_done_at_once
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, sort_effects
 from armwright.program.vm.synchronization import deadlock_error
+from armwright.program.vm.tracking import lose_frame, next_loss
 from armwright.program.vm.watches import is_stuck, judge_watches
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
@@ -146,10 +147,16 @@ def _let_time_pass(machine: Machine, process: Process) -> Mishap | None:
     if process.due_tick is None or process.due_tick <= state.ticks:
         return None
     last = max(0, math.floor(machine.limits.time / period + _TICK_TOLERANCE))
-    mishap = machine.hardware.advance(min(process.due_tick, last) * period)
+    until, loss = min(process.due_tick, last), next_loss(machine)
+    if loss is not None:
+        until = min(until, max(loss[0], state.ticks))
+    mishap = machine.hardware.advance(until * period)
     if mishap is not None:
         state.ticks, state.idle_steps = round(mishap.time / period), 0
         return mishap
+    if loss is not None and loss[0] <= until:
+        state.ticks, state.idle_steps = until, 0
+        return lose_frame(machine, _user_of(machine, loss[1]) or process, loss[1])
     state.ticks, state.idle_steps = min(process.due_tick, last), 0
     if process.due_tick > last:
         # The clock stops there, and moving arms have come as far as that.
@@ -166,7 +173,13 @@ def _affected_process(machine: Machine, mishap: Mishap) -> Process | None:
     mover = machine.moving_process(mishap.arm)
     if mover is not None:
         return mover
-    users = [process for process in machine.state.processes if process.last_arm == mishap.arm]
+    return _user_of(machine, mishap.arm)
+
+
+def _user_of(machine: Machine, arm: str) -> Process | None:
+    """Return the innermost process that has used an arm last."""
+    users = [process for process in machine.state.processes if process.last_arm == arm]
+    users = users or [process for process in machine.state.owners.get(arm, ()) if not process.done]
     return max(users, key=lambda process: len(process.path), default=None)
 
 

@@ -263,6 +263,7 @@ class Machine:
         if is_arm(name) or name == WORLD:
             text = f"`{self.spelling(name)}` cannot be assigned a value"
             raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
+        self.require_placeable(process, leader, span)
         if leader != name and (is_arm(leader) or leader == WORLD):
             attached = f"`{self.spelling(name)}` is rigidly attached to {self.spelling(leader)}"
             text = f"{attached}, which an assignment cannot move"
@@ -286,6 +287,36 @@ class Machine:
         """Return the arm that a frame is or hangs on; None where it hangs on none."""
         return next((frame for frame in (name, *self.state.tree.ancestors(name)) if is_arm(frame)), None)
 
+    def moving_frame(self, name: str) -> str | None:
+        """Return the frame that moves by itself which a frame is or hangs on; None where it hangs on none."""
+        moving = self.cell.moving_frames
+        frames = (name, *self.state.tree.ancestors(name)) if moving else ()
+        return next((frame for frame in frames if frame in moving), None)
+
+    def moving_frame_named(self, process: Process, step: Instruction) -> str:
+        """Return the frame that moves by itself which the operand of an instruction names.
+
+        Raises:
+            RunError: it is none.
+        """
+        name = self.resolve_name(process, step.operands[0])
+        if name not in self.cell.moving_frames:
+            known = f"frames of the cell that move: {', '.join(sorted(self.cell.moving_frames)) or 'none'}"
+            text = f"`{self.spelling(name)}` is no frame of the cell that moves"
+            raise self.error(process, "E249", text, step.span, "nothing to track", notes=[known])
+        return name
+
+    def require_placeable(self, process: Process, name: str, span: Span) -> None:
+        """See to it that a frame may be placed and attached: the cell moves some.
+
+        Raises:
+            RunError: the cell moves it.
+        """
+        if name in self.cell.moving_frames:
+            text = f"`{self.spelling(name)}` is moved by the cell, and cannot be placed or attached"
+            advice = f"affix a frame of the program to `{self.spelling(name)}`"
+            raise self.error(process, "E249", text, span, "moves by itself", helps=[advice])
+
     def loaded_arm(self, name: str) -> Arm:
         """Return the model of an arm with the parts that it holds now."""
         if not self.cell.parts:
@@ -303,9 +334,16 @@ class Machine:
 
     def update_frame(self, process: Process, name: str) -> None:
         """Let the frame table know where a frame is now, if a moving arm carries it."""
-        if name not in self.state.tree or not any(process.motion for process in self.state.processes):
+        if name not in self.state.tree:
+            return
+        if (mobile := self.moving_frame(name)) is not None:
+            X_WF = self.cell.moving_frames[mobile].pose_at(self.now)
+            self.state.tree = self.state.tree.set_pose(mobile, X_WF)
+        if not (self.state.following or any(process.motion for process in self.state.processes)):
             return
         arm = self.carrier(name)
+        if arm in self.state.following:
+            self.state.tree = self.state.tree.set_pose(arm, self.gripper_pose(arm))
         mover = None if arm is None else self.moving_process(arm)
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.activation.kind == "condition"):

@@ -48,6 +48,7 @@ from armwright.program.vm.moves_ahead import fits, goes_over, merged
 from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
+from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, rest_of_following, stop_following
 from armwright.spatial.poses import inverse
 
 # A pose this many times farther than the arm reaches was probably typed in another unit.
@@ -71,6 +72,11 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim_arm(process, arm, step.span, moved)
     _require_idle_arm(machine, process, arm, step.span)
+    if arm in machine.state.following and request.tracked is None:
+        stop_following(machine, process, arm, step.span)
+    if (rest := rest_tick(machine, arm)) > machine.state.ticks:
+        process.pc, process.wake_tick = process.pc - 1, rest
+        return
     if process.ahead is not None or goes_over(request):
         ahead = process.ahead or MovesAhead(arm=arm, moved=moved, implied_affix=implied)
         _put_ahead(machine, process, ahead, request, moved)
@@ -121,7 +127,12 @@ def _begin_move(
 ) -> None:
     """Plan a MOVE and begin its first stage."""
     machine.state.idle_steps += _STEPS_PER_MOVE
-    planned = _plan_stages(machine, process, request, arm, moved)
+    tracking = None
+    if request.tracked is not None:
+        stage, tracking = plan_tracking(machine, process, request, (arm, moved), _planner(machine, arm))
+        planned: list[tuple[PlannedStage, tuple[str, ...]]] = [(stage, (request.form.goal,))]
+    else:
+        planned = _plan_stages(machine, process, request, arm, moved)
     stages = checked_stages(machine, process, request, arm, planned)
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
@@ -142,6 +153,7 @@ def _begin_move(
         stack_depth=len(process.stack),
         start=machine.next_start(),
         guards=request.guards,
+        tracking=tracking,
     )
     start_stage(machine, process, process.motion)
 
@@ -234,6 +246,8 @@ def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction)
     if is_arm(moved):
         return moved, False
     machine.slot_value(process, moved, begin.span)
+    for name in machine.state.following:
+        machine.update_frame(process, name)
     if (arm := machine.carrier(moved)) is not None:
         return arm, False
     X_WM = machine.state.tree.world(moved)
@@ -440,11 +454,12 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     touch = machine.hardware.contact_time(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm_tick is not None):
         pressed = machine.hardware.peak_contact(motion.arm, machine.now + trajectory.duration)
-        send_trajectory(machine, motion, hold(trajectory(0.0), period))
+        send_trajectory(machine, motion, rest_of_following(machine, motion.arm) or hold(trajectory(0.0), period))
         motion.alarm_tick = None
         refuse_contact(machine, process, motion, goal_names[-1], pressed)
     if touch is not None:
         motion.first_contact = (trajectory, touch - machine.now)
+    leave_frame(machine, motion.arm)
     motion.stage_index, (peak, when) = len(machine.state.stages), peak_efforts(arm, tau, period)
     machine.state.stages.append(
         RunStage(
@@ -464,7 +479,9 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     )
     run = TrajectorySegment(t0=machine.now, trajectory=trajectory, duration=trajectory.duration, tau=tau)
     machine.state.segments[motion.arm].append(run)
-    motion.stage_start_tick, motion.stage_end_tick = machine.state.ticks, machine.state.ticks + ticks
+    # Who tracks a frame is there before the motion ends, and follows it then.
+    lasts = ticks if motion.tracking is None else motion.tracking.reached
+    motion.stage_start_tick, motion.stage_end_tick = machine.state.ticks, machine.state.ticks + lasts
     if any(guard.reads_pose for guard in motion.guards):
         motion.hand_poses = machine.base_pose(motion.arm) @ forward(arm, trajectory(np.arange(counted + 1) * period))
     process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
@@ -498,6 +515,7 @@ def finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     text, since, data = motion.trace_text + contact_text, motion.start, {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", text, motion.span, since=since, arm=arm, data=data)
     process.motion = None
+    follow(machine, motion)
 
 
 HANDLERS: Mapping[Op, Handler] = {

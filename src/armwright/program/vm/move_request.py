@@ -39,6 +39,8 @@ class Goal(NamedTuple):
 class MoveRequest(NamedTuple):
     """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is.
 
+    ``tracked`` is the frame of the cell with which the goal moves.
+
     Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm, and
     ``fixed_joints`` the joint positions (n,) there, where JOINTS asks for some.
     """
@@ -53,6 +55,7 @@ class MoveRequest(NamedTuple):
     span: Span
     joints: Sequence[float] | str | None = None
     tool: ToolLimits | None = None
+    tracked: str | None = None
     fixed: Mapping[str, Array] = MappingProxyType({})
     fixed_joints: Mapping[str, Array] = MappingProxyType({})
 
@@ -68,6 +71,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
     numbers: dict[Op, float] = {}
     guards: list[Guard] = []
     joints: Sequence[float] | str | None = None
+    tracked: str | None = None
     for part in parts:
         if part.op is Op.MVJNT:
             joints = [machine.read_number(process, operand, part.span) for operand in part.operands]
@@ -80,6 +84,8 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
             goals[part.op] = [_goal(machine, process, operand, part) for operand in part.operands]
         elif part.op in _NUMBERS:
             numbers[part.op] = _clause_value(machine, process, part)
+        elif part.op is Op.MVTRK:
+            tracked = machine.moving_frame_named(process, part)
         elif part.op is Op.MVON:
             guards.append(_guard(machine, part))
     _make_labels_unique(goals)
@@ -91,6 +97,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         straight=any(part.op is Op.MVSTR for part in parts),
         blend=Op.MVBLD in numbers,
         circular=any(part.op is Op.MVCIR for part in parts),
+        tracking=tracked is not None,
     )
     duration, units = numbers.get(Op.MVDUR), machine.code.units
     limits = {
@@ -114,6 +121,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         span=step.span,
         joints=joints,
         tool=ToolLimits(**limits) if limits else None,
+        tracked=tracked,
     )
 
 

@@ -245,6 +245,24 @@ class Threat(NamedTuple):
     stopped: str
 
 
+class Tracking(NamedTuple):
+    """How a MOVE tracks a frame that moves.
+
+    Attributes:
+        frame: the frame.
+        X_FT: (4, 4) pose of the tool at the goal, in it.
+        reached: how long the tool takes to its goal [ticks].
+        end: how long it is followed, since the MOVE began [ticks]; None where it stands in the window at last.
+        cut: why it is followed no longer; empty where it leaves the window.
+    """
+
+    frame: str
+    X_FT: Array
+    reached: int
+    end: int | None
+    cut: str
+
+
 class EarlyEnd(enum.StrEnum):
     """What ends a motion before its goal."""
 
@@ -282,6 +300,7 @@ class Motion:
         early_end: what ended it before its goal; None where nothing did.
         course: of its present stage, where that was resumed; None where it was not.
         stopped: where its present stage was stopped, which may be its end; None where that runs.
+        tracking: of a frame that moves, which the arm follows when the MOVE is over; None where it does not.
     """
 
     arm: str
@@ -309,6 +328,7 @@ class Motion:
     early_end: EarlyEnd | None = None
     course: Course | None = None
     stopped: StoppedOn | None = None
+    tracking: Tracking | None = None
 
     @property
     def trace_text(self) -> str:

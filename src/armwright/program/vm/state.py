@@ -47,6 +47,7 @@ class MachineState:
         values: of variables that are no frames.
         events: how often each was signalled and not yet waited for.
         timers: of each timer its seconds, and since which tick it runs; None where it is stopped.
+        following: the arms that follow a frame that moves, each with the MOVE that has come to it.
         locks: which process holds each variable that is locked.
         owners: the processes that use each arm.
         hands: the gripper of each arm.
@@ -77,6 +78,7 @@ class MachineState:
     values: dict[str, float | bool | str | Array] = attrs.field(factory=dict)
     events: dict[str, int] = attrs.field(factory=dict)
     timers: dict[str, tuple[float, int | None]] = attrs.field(factory=dict)
+    following: dict[str, Motion] = attrs.field(factory=dict)
     locks: dict[str, Process] = attrs.field(factory=dict)
     owners: dict[str, list[Process]] = attrs.field(factory=dict)
     pose_origins: dict[str, Span] = attrs.field(factory=dict)

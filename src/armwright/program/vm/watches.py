@@ -209,6 +209,9 @@ def _resume(machine: Machine, process: Process, step: Instruction) -> None:
         return
     motion = interruption.motion or process.motion
     assert motion is not None  # noqa: S101 - it has been braked
+    if motion.tracking is not None:
+        text, help_ = "a MOVE that tracks a frame cannot be resumed", "leave RESUME out, and track it with another MOVE"
+        raise machine.error(process, "E409", text, step.span, "the frame has gone on", helps=[help_])
     interruption.motion, interruption.braked, process.motion = None, False, motion
     motion.stages[:0] = _stages_to_go_on(machine, motion)
     motion.rest_tick = motion.stopped = None
