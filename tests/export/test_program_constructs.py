@@ -24,9 +24,8 @@ CELLS = {
 }
 DECLARED = """
 UNITS MM ;
-RECORD part ; weight : SCALAR ; place : FRAME ; END ;
-VAR item : ARRAY [2] OF part ; a, b, c, belt : FRAME ; slot : ARRAY [2] OF FRAME ; n : SCALAR ;
-    note : TEXT ; flag : BOOLEAN ;
+RECORD part ; weight : SCALAR ; place : FRAME ; END ; VAR n : SCALAR ; note : TEXT ; flag : BOOLEAN ;
+VAR item : ARRAY [2] OF part ; a, b, c, belt : FRAME ; slot : ARRAY [2] OF FRAME ;
 PROCEDURE visit(f : FRAME) ; BEGIN MOVE ARM_1 TO f END ;
 FUNCTION beside(f : FRAME) : FRAME ; BEGIN RETURN f * XYZ(n, 0, 0) END ;
 BEGIN
@@ -66,7 +65,7 @@ PROGRAMS = {
     "TRY, RECOVER, RAISE": "TRY RAISE odd ; RECOVER PAUSE 0.1 ; END ;",
     "WHEN, BRAKE, RESUME": "WHEN n > 99 DO n = 1 ;",
     "TIMER": "TIMER t ON ;",
-    "MOVE to JOINTS": "MOVE ARM_1 TO JOINTS(10, -80, 90, 0, 30, 0) ;",
+    "MOVE to JOINTS": "MOVE ARM_1 TO JOINTS(10, -60, 60, 0, 30, 0) ;",
     "CIRCULARLY": "MOVE ARM_1 TO b CIRCULARLY, VIA (b * XYZ(20, 20, 0)) ;",
     "VELOCITY, ROTATION, ACCELERATION": "MOVE ARM_1 TO b STRAIGHTLY, WITH ROTATION = 20 ;",
     "BLEND into the next MOVE": "MOVE ARM_1 TO b WITH BLEND = 10 ; MOVE ARM_1 TO a ;",
