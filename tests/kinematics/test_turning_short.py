@@ -38,6 +38,7 @@ def test_tilt_of_a_scara(name: str, sample: Sample) -> None:
         )
 
 
+@pytest.mark.filterwarnings("ignore::armwright.errors.UnitWarning")  # the minimizer turns joints as far as it likes
 @pytest.mark.share(0.05)
 def test_five_joints(sample: Sample) -> None:
     """Nothing that SciPy finds at the position is turned nearer to the pose."""

@@ -30,6 +30,7 @@ CELLS = {
     "weld": "stanford_cell",
     "sort": "ur5_cell",
     "fetch": "stanford_cell",
+    "belt": "belt_cell",
     "gearbox": "puma_cell",
     "around": "puma_cell",
     "peg": "peg_cell",

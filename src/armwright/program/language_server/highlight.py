@@ -30,7 +30,8 @@ TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES)) - WORDS_IN_CONTEXT
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 
-_NAME = r"(?a:[A-Z]\w*)(?!\w)"
+_PART = r"(?a:[A-Z]\w*)"
+_NAME = rf"{_PART}(?!\w)"
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 
 
@@ -84,6 +85,8 @@ class RloLexer(RegexLexer):
         "operand": [
             (r"(?a:ARM[-_][0-9]+)(?!\w)", Name.Builtin.Pseudo),
             (r"(?a:ARM)(?:(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+)?(?!\w)", Error),
+            # The name of a module or a record, and what is behind its point.
+            (rf"(?!{_any_of(_VOCABULARY.reserved)}){_PART}(?:\.{_PART})+(?![\w.])", Name),
             (rf"{_NUMBER}(?={_any_of(UNITS)}(?!\.))", Number, "unit"),
             (rf"{_NUMBER}(?![\w.])", Number),
             (r"\.?[0-9](?:[\w.]|(?<=E)[+-](?=[0-9]))*", Error),
