@@ -26,7 +26,6 @@ from armwright.export.checkers.machine import (
     World,
     angles_of,
     arithmetic,
-    compared,
     pose_of,
 )
 from armwright.export.checkers.orientations import from_zyx_degrees
@@ -100,17 +99,17 @@ class _Machine(Machine):
                 self._call(node, line)
             case "if":
                 condition, then, *otherwise = parts
-                if self._truth(condition, line):
+                if self.truth(condition, line):
                     self.block(then.children)
                 elif otherwise and otherwise[0] is not None:
                     self.block(otherwise[0].children)
             case "while":
-                while self._truth(parts[0], line):
+                while self.truth(parts[0], line):
                     self.count_step(line)
                     self.block(parts[1].children)
             case "repeat":
                 self.block(parts[0].children)
-                while not self._truth(parts[1], line):
+                while not self.truth(parts[1], line):
                     self.count_step(line)
                     self.block(parts[0].children)
             case "for":
@@ -159,7 +158,7 @@ class _Machine(Machine):
             raise CheckError(f"line {line}: expected a condition")
         if condition.data == "name" and str(condition.children[0].children[0]).upper() == "TRUE":
             self.world.wait()
-        while not self._truth(condition, line):
+        while not self.truth(condition, line):
             self.count_step(line)
             self.world.wait()
 
@@ -224,17 +223,7 @@ class _Machine(Machine):
 
     # ---- values ----------------------------------------------------------------------------------------------------
 
-    def _truth(self, node: Any, line: int) -> bool:
-        value = self.value(node)
-        if not isinstance(value, bool):
-            raise CheckError(f"line {line}: expected a condition")
-        return value
-
-    def _truths(self, nodes: Iterable[Any], line: int) -> list[bool]:
-        """Return conditions, all of which are looked at."""
-        return [self._truth(node, line) for node in nodes]
-
-    def value(self, node: Any) -> Any:  # noqa: C901, PLR0911, PLR0912 - one case per kind
+    def value(self, node: Any) -> Any:  # noqa: PLR0911 - one case per kind
         """Return the value of an expression."""
         line, parts = node.meta.line, node.children
         match node.data:
@@ -251,9 +240,6 @@ class _Machine(Machine):
                 return self._named(parts[0], line)
             case "call":
                 return self._call(node, line)
-            case "signed":
-                value = self.value(parts[1])
-                return -value if parts[0] == "-" else value
             case "frames":
                 X = _matrix(self.value(parts[0]))
                 for part in parts[1:]:
@@ -261,16 +247,7 @@ class _Machine(Machine):
                 return _fields(X)
             case "sum" | "product":
                 return self._chain(parts, line)
-            case "comparison":
-                left, operation, right = parts
-                return compared(str(operation), self.value(left), self.value(right), line)
-            case "not":
-                return not self._truth(parts[0], line)
-            case "conjunction":
-                return all(self._truths(parts, line))
-            case "disjunction" if {str(one).upper() for one in parts[1::2]} == {"OR"}:
-                return any(self._truths(parts[::2], line))
-        raise CheckError(f"line {line}: the machine does not know this value ({node.data})")
+        return self.operation(node)
 
     def _chain(self, parts: Sequence[Any], line: int) -> Any:
         total = self.value(parts[0])
@@ -320,7 +297,7 @@ class _Machine(Machine):
                     raise CheckError(f"line {line}: the machine does not know {word}")
             case "PULSE":
                 output = self.value(values[0].children[0].children[1])
-                if not self._truth(values[1], line):
+                if not self.truth(values[1], line):
                     raise CheckError(f"line {line}: the machine knows pulses that are on alone")
                 self.done(PulseAction(line=line, output=output, seconds=float(self.value(values[2]))))
             case "STRCLEAR":

@@ -1,7 +1,8 @@
 """What the machines of all languages share: a cell whose inputs they read, and the actions that they leave."""
 
 import math
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -54,7 +55,7 @@ class EndProgram(Exception):  # noqa: N818 - no error
     """The program ends."""
 
 
-class Machine:
+class Machine(ABC):
     """A controller that runs a program: what it has done, and the variables that hold.
 
     Attributes:
@@ -97,6 +98,47 @@ class Machine:
             if name in variables:
                 return variables[name]
         raise CheckError(f"line {line}: there is no variable {name}")
+
+    @abstractmethod
+    def value(self, node: Any) -> Any:
+        """Return the value of an expression."""
+
+    def truth(self, node: Any, line: int) -> bool:
+        """Return the value of a condition.
+
+        Raises:
+            CheckError: it is none.
+        """
+        value = self.value(node)
+        if not isinstance(value, bool):
+            raise CheckError(f"line {line}: expected a condition")
+        return value
+
+    def _truths(self, nodes: Iterable[Any], line: int) -> list[bool]:
+        """Return conditions, all of which are looked at."""
+        return [self.truth(node, line) for node in nodes]
+
+    def operation(self, node: Any) -> Any:
+        """Return the value of an expression whose operation all languages have.
+
+        Raises:
+            CheckError: it is another one.
+        """
+        line, parts = node.meta.line, node.children
+        match node.data:
+            case "signed":
+                value = self.value(parts[1])
+                return -value if parts[0] == "-" else value
+            case "comparison":
+                left, operation, right = parts
+                return compared(str(operation), self.value(left), self.value(right), line)
+            case "not":
+                return not self.truth(parts[0], line)
+            case "conjunction":
+                return all(self._truths(parts, line))
+            case "disjunction" if {str(one).upper() for one in parts[1::2]} == {"OR"}:
+                return any(self._truths(parts[::2], line))
+        raise CheckError(f"line {line}: the machine does not know this value ({node.data})")
 
     def read_program(self, name: str) -> ReadProgram:
         """Return what has been done."""

@@ -25,7 +25,6 @@ from armwright.export.checkers.machine import (
     ReturnValue,
     World,
     arithmetic,
-    compared,
     pose_of,
 )
 from armwright.export.checkers.orientations import from_quaternion, from_zyx_degrees
@@ -115,7 +114,7 @@ class _Machine(Machine):
             case "if":
                 self._if(parts, line)
             case "while":
-                while self._truth(parts[0], line):
+                while self.truth(parts[0], line):
                     self.count_step(line)
                     self.block(parts[1].children)
             case "for":
@@ -130,7 +129,7 @@ class _Machine(Machine):
     def _if(self, parts: Sequence[Any], line: int) -> None:
         *branches, last = parts
         for condition, body in zip(branches[::2], branches[1::2], strict=True):
-            if self._truth(condition, line):
+            if self.truth(condition, line):
                 self.block(body.children)
                 return
         if last is not None:
@@ -248,7 +247,7 @@ class _Machine(Machine):
     def _wait_until(self, condition: Any, switches: dict[str, Any], line: int) -> None:
         limit = self.value(switches["MaxTime"]) if "MaxTime" in switches else math.inf
         begun, late = self.world.now, False
-        while not self._truth(condition, line):
+        while not self.truth(condition, line):
             self.count_step(line)
             if self.world.now - begun >= limit - 1e-9:
                 late = True
@@ -261,17 +260,7 @@ class _Machine(Machine):
 
     # ---- values ----------------------------------------------------------------------------------------------------
 
-    def _truth(self, node: Any, line: int) -> bool:
-        value = self.value(node)
-        if not isinstance(value, bool):
-            raise CheckError(f"line {line}: expected a condition")
-        return value
-
-    def _truths(self, nodes: Iterable[Any], line: int) -> list[bool]:
-        """Return conditions, all of which are looked at."""
-        return [self._truth(node, line) for node in nodes]
-
-    def value(self, node: Any) -> Any:  # noqa: C901, PLR0911, PLR0912 - one case per kind
+    def value(self, node: Any) -> Any:  # noqa: PLR0911 - one case per kind
         """Return the value of an expression."""
         line, parts = node.meta.line, node.children
         match node.data:
@@ -290,9 +279,6 @@ class _Machine(Machine):
             case "call_function":
                 listed = parts[1].children if parts[1] is not None else []
                 return self._function(str(parts[0]), [one.children[0] for one in listed], line)
-            case "signed":
-                value = self.value(parts[1])
-                return -value if parts[0] == "-" else value
             case "sum" | "product":
                 total = self.value(parts[0])
                 for operation, part in zip(parts[1::2], parts[2::2], strict=True):
@@ -300,16 +286,7 @@ class _Machine(Machine):
                     joined = isinstance(total, str) and operation == "+"
                     total = total + other if joined else arithmetic(str(operation), total, other, line)
                 return total
-            case "comparison":
-                left, operation, right = parts
-                return compared(str(operation), self.value(left), self.value(right), line)
-            case "not":
-                return not self._truth(parts[0], line)
-            case "conjunction":
-                return all(self._truths(parts, line))
-            case "disjunction" if {str(one).upper() for one in parts[1::2]} == {"OR"}:
-                return any(self._truths(parts[::2], line))
-        raise CheckError(f"line {line}: the machine does not know this value ({node.data})")
+        return self.operation(node)
 
     def _named(self, target: Any, line: int) -> Any:
         name, *others = target.children

@@ -26,7 +26,6 @@ from armwright.export.checkers.machine import (
     ReturnValue,
     World,
     arithmetic,
-    compared,
     pose_of,
     rotation_vector_of,
 )
@@ -91,7 +90,7 @@ class _Machine(Machine):
                 self._if(node)
             case "while":
                 condition, body = node.children
-                while self._truth(condition, line):
+                while self.truth(condition, line):
                     self.count_step(line)
                     try:
                         self.block(body.children)
@@ -115,7 +114,7 @@ class _Machine(Machine):
     def _if(self, node: Any) -> None:
         *parts, last = node.children
         for condition, body in zip(parts[::2], parts[1::2], strict=True):
-            if self._truth(condition, node.meta.line):
+            if self.truth(condition, node.meta.line):
                 self.block(body.children)
                 return
         if last is not None:
@@ -147,17 +146,7 @@ class _Machine(Machine):
 
     # ---- values ----------------------------------------------------------------------------------------------------
 
-    def _truth(self, node: Any, line: int) -> bool:
-        value = self.value(node)
-        if not isinstance(value, bool):
-            raise CheckError(f"line {line}: expected a condition")
-        return value
-
-    def _truths(self, nodes: Iterable[Any], line: int) -> list[bool]:
-        """Return conditions, all of which are looked at."""
-        return [self._truth(node, line) for node in nodes]
-
-    def value(self, node: Any) -> Any:  # noqa: C901, PLR0911, PLR0912 - one case per kind
+    def value(self, node: Any) -> Any:  # noqa: C901, PLR0911 - one case per kind
         """Return the value of an expression."""
         line, parts = node.meta.line, node.children
         match node.data:
@@ -183,24 +172,12 @@ class _Machine(Machine):
                 return array[self._index(array, index, line)]
             case "call":
                 return self._call(node)
-            case "signed":
-                value = self.value(parts[1])
-                return -value if parts[0] == "-" else value
             case "sum" | "product":
                 total = self.value(parts[0])
                 for operation, part in zip(parts[1::2], parts[2::2], strict=True):
                     total = arithmetic(str(operation), total, self.value(part), line)
                 return total
-            case "comparison":
-                left, operation, right = parts
-                return compared(str(operation), self.value(left), self.value(right), line)
-            case "not":
-                return not self._truth(parts[0], line)
-            case "conjunction":
-                return all(self._truths(parts, line))
-            case "disjunction" if set(map(str, parts[1::2])) == {"or"}:
-                return any(self._truths(parts[::2], line))
-        raise CheckError(f"line {line}: the machine does not know this value ({node.data})")
+        return self.operation(node)
 
     def _index(self, array: Sequence[Any], index: Any, line: int) -> int:
         if not isinstance(index, int) or not 0 <= index < len(array):
