@@ -46,8 +46,8 @@ from armwright.export.writers.krl import (
 )
 from armwright.export.writers.posture import postures, status_and_turn
 from armwright.export.writers.program_text import (
-    Names,
-    ValueText,
+    ProgramWriter,
+    TextInDegrees,
     chunks_of_text,
     is_whole,
     number_of,
@@ -56,12 +56,10 @@ from armwright.export.writers.program_text import (
     scaled,
 )
 from armwright.export.writers.reserved_words import KRL
-from armwright.export.writers.text import decimal, identifier, plain_lines
+from armwright.export.writers.text import decimal, plain_lines
 from armwright.program.language.units import NORMAL_SPEED
 
-_ATOM, _FRAMES, _PRODUCT = 9, 8, 6
-# Lengths of the controller are millimetres, angles degrees.
-_MILLIMETRES = 1e3
+_ATOM, _FRAMES = 9, 8
 _TYPES: dict[Kind, str] = {"truth": "BOOL", "pose": "FRAME"}
 # The timer that ends waits.
 _TIMER = 10
@@ -83,25 +81,10 @@ def short_frame(X: Array) -> str:
     return re.sub(r"\.?0+(?=,|$)", "", frame_text(X))
 
 
-class _Text(ValueText):
+class _Text(TextInDegrees):
     """Values in KRL."""
 
     words = {"=": "==", "negative": "-", "and": "AND", "or": "OR", "not": "NOT"}  # noqa: RUF012 - read alone
-
-    def __init__(self, code: ProgramCode, names: Names) -> None:
-        super().__init__(code, names)
-        self.helpers: dict[str, None] = {}
-
-    def helper(self, name: str) -> str:
-        """Return the name of a function that the file gets too."""
-        self.helpers[name] = None
-        return self.names(name)
-
-    def call(self, name: str, arguments: Iterable[str]) -> str:
-        return f"{name}({','.join(arguments)})"
-
-    def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
-        return str(truth).upper()
 
     def pose(self, X: Array) -> str:
         return f"{{FRAME: {short_frame(X)}}}"
@@ -131,31 +114,23 @@ class _Text(ValueText):
             case "inverse":
                 return self.call(self.helper("INVERSE OF"), map(self.text, arguments)), _ATOM
             case "xyz":
-                lengths = [self.text(scaled(one, self.metres * _MILLIMETRES)) for one in arguments]
+                lengths = [self.millimetres(one) for one in arguments]
                 return self.call(self.helper("SHIFTED BY"), lengths), _ATOM
             case "rotx" | "roty" | "rotz" | "rpy":
-                angle = [self.text(scaled(one, float(np.degrees(self.radians)))) for one in arguments]
+                angle = [self.degrees(one) for one in arguments]
                 angles = {"rotx": ("0", "0", angle[0]), "roty": ("0", angle[0], "0"), "rotz": (angle[0], "0", "0")}
                 return self.call(self.helper("TURNED BY"), angles.get(name, tuple(reversed(angle)))), _ATOM
             case "dist":
-                return self._over(self.call(self.helper("DISTANCE OF"), map(self.text, arguments)))
+                return self.over_millimetres(self.call(self.helper("DISTANCE OF"), map(self.text, arguments)))
             case "x" | "y" | "z":
                 if isinstance(arguments[0], Variable):
-                    return self._over(f"{self.text(arguments[0])}.{name.upper()}")
-                return self._over(self.call(self.helper(f"{name.upper()} OF"), [self.text(arguments[0])]))
+                    return self.over_millimetres(f"{self.text(arguments[0])}.{name.upper()}")
+                return self.over_millimetres(self.call(self.helper(f"{name.upper()} OF"), [self.text(arguments[0])]))
             case "sin" | "cos" | "tan":
-                angle = [self.text(scaled(arguments[0], float(np.degrees(self.radians))))]
-                return self.call(name.upper(), angle), _ATOM
+                return self.call(name.upper(), [self.degrees(arguments[0])]), _ATOM
             case "atan2":
-                text = self.call("ATAN2", map(self.text, arguments))
-                unit = float(np.degrees(self.radians))
-                return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRODUCT)
+                return self.over(self.call("ATAN2", map(self.text, arguments)), float(np.degrees(self.radians)))
         return self.call(name.upper(), map(self.text, arguments)), _ATOM
-
-    def _over(self, text: str) -> tuple[str, int]:
-        """Return a length of the controller in the unit of the program."""
-        unit = self.metres * _MILLIMETRES
-        return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRODUCT)
 
     def type(self, key: str) -> str:
         """Return the type of a variable or parameter."""
@@ -163,13 +138,11 @@ class _Text(ValueText):
         return _TYPES[kind] if kind != "number" else "INT" if key in self.whole else "REAL"
 
 
-class _Writer:
+class _Writer(ProgramWriter):
     """A program while it is written."""
 
     def __init__(self, code: ProgramCode) -> None:
-        self._code = code
-        self.name = identifier(code.name, NAME_LIMIT, KRL)
-        self._names = Names(NAME_LIMIT, {*KRL, self.name.lower()})
+        super().__init__(code, NAME_LIMIT, KRL)
         self._values = _Text(code, self._names)
         self._own: dict[str, str] = {}
 
@@ -237,12 +210,6 @@ class _Writer:
         return [f"$OUT[{number_of(self._code, address, name, least=1)}]=FALSE" for name, address in self._code.outputs]
 
     # ---- statements ------------------------------------------------------------------------------------------------
-
-    def _block(self, statements: Iterable[Statement]) -> list[str]:
-        return [line for statement in statements for line in self._lines(statement)]
-
-    def _inner(self, statements: Iterable[Statement]) -> list[str]:
-        return [f"  {line}" for line in self._block(statements)]
 
     def _lines(self, statement: Statement) -> Iterator[str]:  # noqa: C901, PLR0912 - one case per kind
         text = self._values.text

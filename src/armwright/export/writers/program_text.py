@@ -1,6 +1,7 @@
 """What the writers of program mode share: names, numbers, operations with their parentheses."""
 
 import hashlib
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
@@ -19,6 +20,7 @@ from armwright.export.translation.code import (
     Print,
     ProgramCode,
     Signal,
+    Statement,
     Truth,
     Value,
     Variable,
@@ -31,6 +33,8 @@ from armwright.version import __version__
 _PRECEDENCE = {"or": 1, "and": 2, "not": 3, "+": 5, "-": 5, "*": 6, "/": 6, "negative": 7}
 _PRECEDENCE |= dict.fromkeys(("<", "<=", "=", "<>", ">=", ">"), 4)
 _ATOM = 9
+# Millimetres in a metre.
+MILLIMETRES = 1e3
 _WHOLE = ("+", "-", "*", "negative")
 
 
@@ -177,6 +181,10 @@ class ValueText(ABC):
         right = right if right_own > strength and right_own >= least and not right.startswith("-") else f"({right})"
         return f"{left} {word} {right}" if strength < _PRECEDENCE["*"] else f"{left}{word}{right}"
 
+    def over(self, text: str, unit: float) -> tuple[str, int]:
+        """Return a length or an angle of the controller in the unit of the program, and how strongly it binds."""
+        return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRECEDENCE["/"])
+
     @abstractmethod
     def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
         """Return TRUE or FALSE."""
@@ -200,6 +208,69 @@ class ValueText(ABC):
     def call(self, name: str, arguments: Iterable[str]) -> str:
         """Return the call of a function."""
         return f"{name}({', '.join(arguments)})"
+
+
+class TextInDegrees(ValueText):
+    """Values of a language that counts in millimetres and degrees, and may need functions that the file gets too.
+
+    Attributes:
+        helpers: names of these functions, in order.
+    """
+
+    def __init__(self, code: ProgramCode, names: Names) -> None:
+        """Take the program and its names."""
+        super().__init__(code, names)
+        self.helpers: dict[str, None] = {}
+
+    def helper(self, name: str) -> str:
+        """Return the name of a function that the file gets too."""
+        self.helpers[name] = None
+        return self.names(name)
+
+    def call(self, name: str, arguments: Iterable[str]) -> str:
+        """Return the call of a function."""
+        return f"{name}({','.join(arguments)})"
+
+    def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
+        """Return TRUE or FALSE."""
+        return str(truth).upper()
+
+    def degrees(self, value: Value) -> str:
+        """Return an angle of the program in degrees."""
+        return self.text(scaled(value, math.degrees(self.radians)))
+
+    def millimetres(self, value: Value) -> str:
+        """Return a length of the program in millimetres."""
+        return self.text(scaled(value, self.metres * MILLIMETRES))
+
+    def over_millimetres(self, text: str) -> tuple[str, int]:
+        """Return a length of the controller in the unit of the program, and how strongly it binds."""
+        return self.over(text, self.metres * MILLIMETRES)
+
+
+class ProgramWriter(ABC):
+    """A program while it is written: its name, its names, and its statements one after the other.
+
+    Attributes:
+        empty: what a list without statements has.
+    """
+
+    empty: tuple[str, ...] = ()
+
+    def __init__(self, code: ProgramCode, limit: int, reserved: Collection[str], *others: str) -> None:
+        """Take the program, how long names may be, and the words that are taken."""
+        self._code = code
+        self.name = identifier(code.name, limit, reserved)
+        self._names = Names(limit, {*reserved, self.name.lower(), *others})
+
+    def _block(self, statements: Iterable[Statement]) -> list[str]:
+        return [line for statement in statements for line in self._lines(statement)]
+
+    def _inner(self, statements: Iterable[Statement]) -> list[str]:
+        return [f"  {line}" for line in self._block(statements) or self.empty]
+
+    @abstractmethod
+    def _lines(self, statement: Statement) -> Iterator[str]: ...
 
 
 def number_text(value: float) -> str:

@@ -37,8 +37,9 @@ from armwright.export.translation.code import (
 from armwright.export.writers.controller_file import ControllerFile
 from armwright.export.writers.posture import confdata, postures
 from armwright.export.writers.program_text import (
-    Names,
-    ValueText,
+    MILLIMETRES,
+    ProgramWriter,
+    TextInDegrees,
     chunks_of_text,
     is_whole,
     program_approximations,
@@ -58,12 +59,11 @@ from armwright.export.writers.rapid import (
     zone_text,
 )
 from armwright.export.writers.reserved_words import RAPID
-from armwright.export.writers.text import decimal, identifier, plain_lines
+from armwright.export.writers.text import decimal, plain_lines
 from armwright.program.language.source import Span
 from armwright.program.language.units import NORMAL_SPEED
 
-_ATOM, _PRODUCT = 9, 6
-_MILLIMETRES = 1e3
+_ATOM = 9
 _TYPES: dict[Kind, str] = {"number": "num", "truth": "bool", "pose": "pose"}
 _WORLD = "world"
 
@@ -83,25 +83,10 @@ def short_pose(X: Array) -> str:
     return f"[{short}]"
 
 
-class _Text(ValueText):
+class _Text(TextInDegrees):
     """Values in RAPID."""
 
     words = {"negative": "-", "and": "AND", "or": "OR", "not": "NOT"}  # noqa: RUF012 - read alone
-
-    def __init__(self, code: ProgramCode, names: Names) -> None:
-        super().__init__(code, names)
-        self.helpers: dict[str, None] = {}
-
-    def helper(self, name: str) -> str:
-        """Return the name of a function that the module gets too."""
-        self.helpers[name] = None
-        return self.names(name)
-
-    def call(self, name: str, arguments: Iterable[str]) -> str:
-        return f"{name}({','.join(arguments)})"
-
-    def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
-        return str(truth).upper()
 
     def pose(self, X: Array) -> str:
         return short_pose(X)
@@ -123,41 +108,30 @@ class _Text(ValueText):
             case "compose" | "inverse":
                 return self.call("PoseMult" if name == "compose" else "PoseInv", map(self.text, arguments)), _ATOM
             case "xyz":
-                lengths = [self.text(scaled(one, self.metres * _MILLIMETRES)) for one in arguments]
+                lengths = [self.millimetres(one) for one in arguments]
                 return f"[[{','.join(lengths)}],[1,0,0,0]]", _ATOM
             case "rotx" | "roty" | "rotz" | "rpy":
-                angle = [self._degrees(one) for one in arguments]
+                angle = [self.degrees(one) for one in arguments]
                 angles = {"rotx": ("0", "0", angle[0]), "roty": ("0", angle[0], "0"), "rotz": (angle[0], "0", "0")}
                 return f"[[0,0,0],OrientZYX({','.join(angles.get(name, tuple(reversed(angle))))})]", _ATOM
             case "dist":
-                return self._over(self.call(self.helper("DISTANCE OF"), map(self.text, arguments)))
+                return self.over_millimetres(self.call(self.helper("DISTANCE OF"), map(self.text, arguments)))
             case "x" | "y" | "z":
                 if isinstance(arguments[0], Variable):
-                    return self._over(f"{self.text(arguments[0])}.trans.{name}")
-                return self._over(self.call(self.helper(f"{name} OF"), [self.text(arguments[0])]))
+                    return self.over_millimetres(f"{self.text(arguments[0])}.trans.{name}")
+                return self.over_millimetres(self.call(self.helper(f"{name} OF"), [self.text(arguments[0])]))
             case "sin" | "cos" | "tan":
-                return self.call(name.capitalize(), [self._degrees(arguments[0])]), _ATOM
+                return self.call(name.capitalize(), [self.degrees(arguments[0])]), _ATOM
             case "atan2":
-                text, unit = self.call("ATan2", map(self.text, arguments)), float(np.degrees(self.radians))
-                return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRODUCT)
+                return self.over(self.call("ATan2", map(self.text, arguments)), float(np.degrees(self.radians)))
         return self.call(name.capitalize(), map(self.text, arguments)), _ATOM
 
-    def _degrees(self, value: Value) -> str:
-        return self.text(scaled(value, float(np.degrees(self.radians))))
 
-    def _over(self, text: str) -> tuple[str, int]:
-        """Return a length of the controller in the unit of the program."""
-        unit = self.metres * _MILLIMETRES
-        return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRODUCT)
-
-
-class _Writer:
+class _Writer(ProgramWriter):
     """A program while it is written."""
 
     def __init__(self, code: ProgramCode) -> None:
-        self._code = code
-        self.name = identifier(code.name, NAME_LIMIT, RAPID)
-        self._names = Names(NAME_LIMIT, {*RAPID, self.name.lower(), _WORLD})
+        super().__init__(code, NAME_LIMIT, RAPID, _WORLD)
         self._values = _Text(code, self._names)
         self._flags: dict[str, None] = {}
 
@@ -209,12 +183,6 @@ class _Writer:
         return [f"SetDO {signal_name(self._code, address, name)},0;" for name, address in self._code.outputs]
 
     # ---- statements ------------------------------------------------------------------------------------------------
-
-    def _block(self, statements: Iterable[Statement]) -> list[str]:
-        return [line for statement in statements for line in self._lines(statement)]
-
-    def _inner(self, statements: Iterable[Statement]) -> list[str]:
-        return [f"  {line}" for line in self._block(statements)]
 
     def _lines(self, statement: Statement) -> Iterator[str]:  # noqa: C901, PLR0912 - one case per kind
         text = self._values.text
@@ -322,7 +290,7 @@ class _Writer:
         if len(one.targets) == 1 and known.reached and one.duration is not None:
             return within(one.duration)
         parts = []
-        for speed in (known.speed * _MILLIMETRES, float(np.degrees(known.turn_speed))):
+        for speed in (known.speed * MILLIMETRES, float(np.degrees(known.turn_speed))):
             asked = scaled(one.speed, speed / NORMAL_SPEED)
             number = isinstance(asked, Number)
             parts.append(decimal(max(asked.value, LEAST_SPEED), 3) if number else self._values.text(asked))  # type: ignore[union-attr]

@@ -35,6 +35,7 @@ from armwright.export.translation.code import (
 from armwright.export.writers.controller_file import ControllerFile
 from armwright.export.writers.program_text import (
     Names,
+    ProgramWriter,
     ValueText,
     chunks_of_text,
     flat_index,
@@ -45,7 +46,7 @@ from armwright.export.writers.program_text import (
     scaled,
 )
 from armwright.export.writers.reserved_words import URSCRIPT
-from armwright.export.writers.text import decimal, identifier, plain_lines
+from armwright.export.writers.text import decimal, plain_lines
 from armwright.export.writers.urscript import (
     LEAST_SPEED,
     MOST_LINES,
@@ -58,7 +59,7 @@ from armwright.export.writers.urscript import (
 from armwright.program.language.source import Span
 from armwright.program.language.units import NORMAL_SPEED
 
-_ATOM, _PRODUCT = 9, 6
+_ATOM = 9
 _ANGLES = {"rotx": 3, "roty": 4, "rotz": 5}
 _COORDINATES = {"x": 0, "y": 1, "z": 2}
 # Numbers that are added so, so that the last pass of a loop is not lost to rounding; a part of the step.
@@ -117,20 +118,16 @@ class _Text(ValueText):
                 angles = [self.text(scaled(one, self.radians)) for one in arguments]
                 return self.call(self.names("RPY POSE"), angles), _ATOM
             case "dist":
-                return self._over(self.call("point_dist", map(self.text, arguments)), self.metres)
+                return self.over(self.call("point_dist", map(self.text, arguments)), self.metres)
             case "x" | "y" | "z":
-                return self._over(f"{self.text(arguments[0])}[{_COORDINATES[name]}]", self.metres)
+                return self.over(f"{self.text(arguments[0])}[{_COORDINATES[name]}]", self.metres)
             case "abs":
                 return self.call("norm", map(self.text, arguments)), _ATOM
             case "sin" | "cos" | "tan":
                 return self.call(name, [self.text(scaled(arguments[0], self.radians))]), _ATOM
             case "atan2":
-                return self._over(self.call(name, map(self.text, arguments)), self.radians)
+                return self.over(self.call(name, map(self.text, arguments)), self.radians)
         return self.call(name, map(self.text, arguments)), _ATOM
-
-    def _over(self, text: str, unit: float) -> tuple[str, int]:
-        """Return a length or an angle of the controller in the unit of the program."""
-        return (text, _ATOM) if unit == 1.0 else (f"{text}/{unit:.10g}", _PRODUCT)
 
 
 def short_pose(X: Array) -> str:
@@ -138,13 +135,13 @@ def short_pose(X: Array) -> str:
     return re.sub(r"\.?0+(?=[,\]])", "", pose_text(X))
 
 
-class _Writer:
+class _Writer(ProgramWriter):
     """A program while it is written."""
 
+    empty = ("pass",)
+
     def __init__(self, code: ProgramCode) -> None:
-        self._code = code
-        self.name = identifier(code.name, NAME_LIMIT, URSCRIPT)
-        self._names = Names(NAME_LIMIT, {*URSCRIPT, self.name.lower()})
+        super().__init__(code, NAME_LIMIT, URSCRIPT)
         self._values = _Text(code, self._names)
         self._threads: list[str] = []
         self._locals: frozenset[str] = frozenset()
@@ -192,12 +189,6 @@ class _Writer:
         ]
 
     # ---- statements ------------------------------------------------------------------------------------------------
-
-    def _block(self, statements: Iterable[Statement]) -> list[str]:
-        return [line for statement in statements for line in self._lines(statement)]
-
-    def _inner(self, statements: Iterable[Statement]) -> list[str]:
-        return [f"  {line}" for line in self._block(statements) or ["pass"]]
 
     def _set(self, target: Variable, text: str) -> str:
         scope = "" if target.key in self._locals or target.indices else "global "
