@@ -328,9 +328,6 @@ def test_times_and_blends_that_are_none(puma: CompiledArm) -> None:
         cartesian_move(puma, X, [0, 1, 2], deviation=0.0)
     with pytest.raises(InvalidValueError, match=r"poses 1 and 2 coincide; omit one, or specify times"):
         cartesian_move(puma, X[[0, 0, 1]])
-    slow_tool = attrs.evolve(puma.arm, tool_speed=np.inf)
-    with pytest.raises(InvalidValueError, match="times are needed, since its tool speed is unknown"):
-        cartesian_move(slow_tool, X)
 
 
 def test_whole_turns_that_fit(puma: CompiledArm) -> None:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import armwright
-from armwright.arm.load import load_arm
+from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm
+from armwright.arm.reach import stretched_length
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
@@ -118,6 +119,49 @@ def test_short_line_with_a_large_turn() -> None:
     assert line.certificate.holds
     assert off <= line.certificate.deviation <= 1e-4
     assert twisted <= line.certificate.rotation <= 5e-4
+
+
+@pytest.mark.share(0.01)
+def test_lines_of_any_arm_of_the_catalogue(sample: Sample) -> None:
+    """An arm whose file states neither reach nor tool speed runs lines too, as far as certified, within its limits."""
+    names = [name for name in arm_names() if load_arm(name).n > 3]
+    stopped = 0
+    for rng in sample.cases(700):
+        arm = load_arm(names[rng.integers(len(names))])
+        middle = np.clip(0.0, arm.limits.lower, arm.limits.upper)
+        q = middle + (np.clip(rng.uniform(-2, 2, arm.n), arm.limits.lower, arm.limits.upper) - middle) * 0.7
+        X_A = forward(arm, q)
+        X_B = X_A.copy()
+        X_B[:3, 3] += rng.normal(size=3) * 0.03
+        try:
+            line = straight_line(arm, q, X_B)
+        except PathError:  # a singularity, a limit, or five joints that cannot keep the direction
+            stopped += 1
+            continue
+        motion, way = line.trajectory, X_B[:3, 3] - X_A[:3, 3]
+        come = forward(arm, motion(np.linspace(0, motion.duration, 500)))[:, :3, 3] - X_A[:3, 3]
+        off = come - np.clip(come @ way / (way @ way), 0, 1)[:, None] * way
+        assert np.linalg.norm(off, axis=-1).max() <= line.certificate.deviation + ROUNDING
+        assert line.certificate.holds
+        assert (motion.peaks(1) <= arm.limits.speed * (1 + ROUNDING)).all()
+        assert (motion.peaks(2) <= arm.limits.acceleration * (1 + ROUNDING)).all()
+    sample.record("lines of the arms of the catalogue", sample.count(700), 0, stopped=stopped)
+
+
+def test_speed_without_stated_reach_and_tool_speed() -> None:
+    """The length of the stretched arm and 1 m/s stand for what the file does not state."""
+    stated = load_arm("ur5")
+    plain = attrs.evolve(stated, reach=np.inf, tool_speed=np.inf)
+    q = np.radians([0.0, -60.0, 80.0, -110.0, -90.0, 0.0])
+    X = forward(plain, q).copy()
+    X[:3, 3] += (0.0, 0.1, 0.0)
+
+    line = straight_line(plain, q, X, speed=20)
+    same = straight_line(attrs.evolve(stated, reach=stretched_length(plain), tool_speed=1.0), q, X, speed=20)
+
+    # d1, a2, a3, d4, d5 and d6 of the maker, one behind the other.
+    assert stretched_length(plain) == pytest.approx(0.089159 + 0.425 + 0.39225 + 0.10915 + 0.09465 + 0.0823)
+    assert line.trajectory.duration == same.trajectory.duration
 
 
 @pytest.mark.drawn(0.34)

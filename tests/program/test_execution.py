@@ -310,7 +310,6 @@ def test_the_shortest_duration() -> None:
     ("cell", "move", "said"),
     [
         (changed(cell_of("cell1"), weak), "VIA (a, b), WITH BLEND = 3cm", "gravity and Coulomb friction alone require"),
-        (changed(cell_of("cell1"), reach=math.inf), "STRAIGHTLY", "Cartesian paths need its reach and its tool speed"),
         (changed(cell_of("cell1"), unlimited), "DIRECTLY", "no moving joint has a limit of speed or acceleration"),
     ],
 )

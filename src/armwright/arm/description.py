@@ -13,6 +13,7 @@ from armwright.arm.coupling import Coupling
 from armwright.arm.gravity import vector_text
 from armwright.arm.limits import Limits
 from armwright.arm.model import Arm, Joint
+from armwright.arm.reach import reach_of, tool_speed_of
 from armwright.arrays import Array
 from armwright.errors import counted
 from armwright.files.result_table import ResultTable
@@ -72,10 +73,11 @@ def facts(model: Arm) -> list[tuple[str, str]]:
 
     pairs = [("base", noap(model.base)), ("tool", noap(model.tool))]
     pairs.append(("gravity", f"{vector_text(model.gravity)}, {_GRAVITY_FROM[model.gravity_from]}"))
-    if math.isfinite(model.reach):
-        pairs.append(("reach", _length(model.reach)))
-    if math.isfinite(model.tool_speed):
-        pairs.append(("tool speed", f"{_length(model.tool_speed)}/s at full reach"))
+    not_stated = "; not stated, "
+    reach = "" if math.isfinite(model.reach) else not_stated + "the length of the stretched arm is used"
+    speed = "" if math.isfinite(model.tool_speed) else not_stated + "the usual speed is used"
+    pairs.append(("reach", _length(reach_of(model)) + reach))
+    pairs.append(("tool speed", f"{_length(tool_speed_of(model))}/s at full reach{speed}"))
     return pairs
 
 

@@ -22,7 +22,7 @@ from armwright.motion.deviation import (
     half_sines,
 )
 from armwright.motion.obstruction import PathError
-from armwright.motion.path import TURN_RADIUS, check_reach, report_speed
+from armwright.motion.path import TURN_RADIUS, report_speed
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.straight import RAMP, limited_time, requested_time, tried_deviations
 from armwright.motion.tolerance import Tolerance, tolerance
@@ -180,11 +180,9 @@ def certified_arc(
     Raises:
         FlatArcError: the positions are on one line.
         PathError: a pose of the arc is out of reach, a joint passes a limit, or a singularity is in the path.
-        IncapableArmError: the arm has no reach or tool speed.
     """
     solver = solver_of(arm)
     planned = arc(np.asarray(solver.forward(q_start)), through, end)
-    check_reach(solver.arm)
     corners = planned.at(np.linspace(0.0, 1.0, _LEGS + 1))[:, :3, 3]
     slowest = min(report_speed(solver.arm, A, B, speed) for A, B in pairwise(corners))
     angle = math.hypot(*planned.rotation)

@@ -139,7 +139,7 @@ def line_or_detour(
     Raises:
         PathError: there is no detour either; the obstacle of the line itself, with position and cause.
         InvalidValueError: ``by``, deviation, speed or damping are none.
-        IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
+        IncapableArmError: gravity alone takes more than a joint may give.
     """
     one_of("detour", method, ("via", "damped"))
     solver = solver_of(arm)

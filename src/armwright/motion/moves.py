@@ -10,6 +10,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
+from armwright.arm.reach import tool_speed_of
 from armwright.arrays import Array, ArrayLike, floats, of_shape, one_or_each
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.candidates import typed_poses
@@ -302,11 +303,7 @@ def _tool_times(arm: Arm, X: Array) -> Array:
     lengths = Path(poses=X).lengths()
     for i in np.flatnonzero(lengths <= NEGLIGIBLE):
         raise InvalidValueError(f"poses {i + 1} and {i + 2} coincide; omit one, or specify times")
-    if not np.isfinite(arm.tool_speed):
-        raise InvalidValueError(
-            f"arm '{arm.name}': times are needed, since its tool speed is unknown ([hand] in the arm file)"
-        )
-    return np.concatenate([[0.0], np.cumsum(lengths / arm.tool_speed)])
+    return np.concatenate([[0.0], np.cumsum(lengths / tool_speed_of(arm))])
 
 
 def _inside_limits(arm: AnyArm, move: Move) -> Move:

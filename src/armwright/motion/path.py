@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
+from armwright.arm.reach import reach_of, tool_speed_of
 from armwright.arrays import Array, ArrayLike, of_shape
-from armwright.errors import IncapableArmError, InvalidValueError
+from armwright.errors import InvalidValueError
 from armwright.motion.quintic_polynomials import TOP_SPEED, check_speed
 from armwright.motion.tolerance import tolerance
 from armwright.spatial.poses import between
@@ -87,7 +88,7 @@ def report_step(arm: Arm, A: ArrayLike, B: ArrayLike, deviation: float) -> float
     Source:
         TR-83-008, "straight line motion", step 1.
     """
-    R = 2 * max(closest_to_axis(A, B), _CLOSEST * arm.reach)
+    R = 2 * max(closest_to_axis(A, B), _CLOSEST * reach_of(arm))
     return math.sqrt(8 * R * deviation)
 
 
@@ -99,20 +100,9 @@ def report_speed(arm: Arm, A: ArrayLike, B: ArrayLike, speed: float) -> float:
     Source:
         TR-83-008, "straight line motion", steps 2 and 3, with alpha = 100/120.
     """
-    r_min = max(closest_to_axis(A, B), _CLOSEST * arm.reach)
-    return check_speed(speed) / TOP_SPEED * min(r_min / arm.reach, 1.0) * arm.tool_speed
-
-
-def check_reach(arm: Arm) -> None:
-    """Refuse an arm for which the report's rule gives no speed.
-
-    Raises:
-        IncapableArmError: it has no reach or tool speed.
-    """
-    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
-        raise IncapableArmError(
-            f"arm '{arm.name}': Cartesian paths need its reach and its tool speed ([hand] in the arm file)"
-        )
+    reach = reach_of(arm)
+    r_min = max(closest_to_axis(A, B), _CLOSEST * reach)
+    return check_speed(speed) / TOP_SPEED * min(r_min / reach, 1.0) * tool_speed_of(arm)
 
 
 def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> Knots:
@@ -122,7 +112,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
     and loses it. A segment without length, between equal poses, gets no knots.
 
     Args:
-        arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
+        arm: the arm; ``reach_of`` and ``tool_speed_of`` it scale the speed.
         path: the segment.
         deviation: allowed distance of the tool from the path [m].
         speed: 1 to 120, 100 is normal.
@@ -130,12 +120,10 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
 
     Raises:
         InvalidValueError: deviation or speed are out of range.
-        IncapableArmError: the arm has no reach or tool speed.
 
     Source:
         TR-83-008, "straight line motion" step 5 and "continuous motion".
     """
-    check_reach(arm)
     tolerance(deviation)
     lengths = path.lengths()
     moving = [i for i, length in enumerate(lengths) if length > NEGLIGIBLE]

@@ -149,7 +149,7 @@ def rounded_move(
     on ``speed`` and the limits as well. Position and orientation are rounded alike.
 
     Args:
-        arm: the arm, or a compiled one; its ``reach`` and ``tool_speed`` scale the speed.
+        arm: the arm, or a compiled one; its reach and the speed of its tool scale the speed.
         path: begins where the tool is at ``q_start``; equal poses one after the other count once.
         q_start: (n,) present joint positions.
         deviation: what a single line may be off [m]; here the joints keep the tool 50 times nearer to its path. No

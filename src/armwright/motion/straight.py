@@ -14,7 +14,7 @@ from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import violations_of
 from armwright.motion.certified_motion import CertifiedMotion, fastest, standstill
 from armwright.motion.obstruction import PathError
-from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, check_reach, report_speed, report_step
+from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
 from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.straight_path import StraightPath, line
@@ -69,7 +69,7 @@ def straight_line(
             on the path, or a singularity keeps the tool from staying within the deviation; with the position and the
             cause.
         InvalidValueError: deviation, rotation or speed are out of range.
-        IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
+        IncapableArmError: gravity alone takes more than a joint may give.
     """
     return certified_line(arm, q_start, X_goal, tolerance(deviation, rotation), speed=speed, period=period)
 
@@ -174,13 +174,11 @@ def even_time(
 
     Raises:
         InvalidValueError: the speed is out of range.
-        IncapableArmError: the arm has no reach or tool speed.
     """
     check_speed(speed)
     length = max(math.dist(A[:3, 3], B[:3, 3]), TURN_RADIUS * math.hypot(*rotation))
     if length <= NEGLIGIBLE:
         return None
-    check_reach(arm)
     report = report_speed(arm, A[:3, 3], B[:3, 3], speed)
     if tool is None:
         return length / report

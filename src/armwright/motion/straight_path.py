@@ -409,7 +409,7 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
     """Return the straight segments of a path, run past its corners without a stop as the report's rule times them.
 
     Args:
-        arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
+        arm: the arm; its reach and the speed of its tool scale the speed.
         path: the segments; those without length are left out.
         deviation: that the rule sets knots for [m].
         speed: 1 to 120.

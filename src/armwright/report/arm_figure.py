@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -10,6 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.reach import stretched_length
 from armwright.arrays import Array
 from armwright.cell.scene import Gripper
 from armwright.physics.cell_bodies import Body as SolidBody, arm_bodies, has_solids
@@ -131,7 +131,7 @@ def _column(name: str, placed: Placed) -> Iterator[tuple[Body, Shape]]:
     bottoms = [float(Y[2, 3]) - support(shape, -Y[2, :3]) for Y, shape in solids]
     high = min(bottoms, default=float(X[2, 3])) - placed.floor
     if X[2, 2] > _UPRIGHT and high > 1e-3:
-        radius = 0.05 * _length(placed.arm)
+        radius = 0.05 * stretched_length(placed.arm)
         pose = np.linalg.inv(X) @ homogeneous(np.eye(3), [X[0, 3], X[1, 3], placed.floor + high / 2])
         yield _body(f"{name} column", pose, 0, "base"), Cylinder(radius=radius, length=high)
 
@@ -160,15 +160,6 @@ def _body(name: str, pose: Array, frame: int, tint: str) -> Body:
     return Body(name=name, shape=0, pose=to_noap(pose), frame=frame, tint=tint)  # type: ignore[arg-type]
 
 
-def _length(arm: Arm) -> float:
-    """Return the length of an arm that is stretched out [m]."""
-    slides = [
-        0.0 if joint.revolute or not math.isfinite(joint.limits.upper) else joint.limits.upper for joint in arm.joints
-    ]
-    spans = (joint.span(abs(slide)) for joint, slide in zip(arm.joints, slides, strict=True))
-    return (sum(spans) + float(np.linalg.norm(arm.tool[:3, 3]))) or 1.0
-
-
 def _finger_length(arm: Arm) -> float:
-    wanted, way = _FINGER * _length(arm), float(np.linalg.norm(arm.tool[:3, 3]))
+    wanted, way = _FINGER * stretched_length(arm), float(np.linalg.norm(arm.tool[:3, 3]))
     return min(wanted, _FINGER_OF_TOOL * way) if way > 0.3 * wanted else wanted

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.reach import stretched_length
 from armwright.arrays import Array, Flags
 from armwright.cell.model import CellArm
 from armwright.compiled.arm import CompiledArm, planning_arm
@@ -126,15 +127,7 @@ class LiveArm:
     @cached_property
     def reach(self) -> float:
         """How far from its base the tool could be if the arm were straight [m]."""
-        arm = self.placed.arm
-        slides = [
-            0.0
-            if joint.revolute
-            else max((abs(x) for x in (joint.limits.lower, joint.limits.upper) if math.isfinite(x)), default=0.0)
-            for joint in arm.joints
-        ]
-        spans = (joint.span(slide) for joint, slide in zip(arm.joints, slides, strict=True))
-        return float(sum(spans)) + float(np.linalg.norm(arm.tool[:3, 3]))
+        return stretched_length(self.placed.arm)
 
     def warm_up(self) -> None:
         """Compile what moving the arm needs."""

@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.arm.reach import reach_of
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
 
@@ -79,7 +80,7 @@ def known_cell(cell: Cell) -> KnownCell:
         ),
         inputs=frozenset(cell.inputs),
         visions=cell.seen_frames,
-        reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
+        reach=max((reach_of(arm.arm) for arm in cell.arms.values()), default=None),
         joints={name: "".join("RP"[not it.revolute] for it in arm.arm.joints) for name, arm in cell.arms.items()},
         targets={name: target.arm for name, target in cell.joint_targets.items()},
         moving=frozenset(cell.moving_frames),

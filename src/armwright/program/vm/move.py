@@ -8,6 +8,7 @@ from typing import NoReturn
 import attrs
 import numpy as np
 
+from armwright.arm.reach import reach_of
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
@@ -429,7 +430,7 @@ def _unit_advice(machine: Machine, process: Process, goal: Goal, arm: str) -> tu
     """Say what lengths are counted in, where a pose so far off can only be meant in another unit."""
     X_BW = inverse(machine.base_pose(arm))
     distance = np.linalg.norm((X_BW @ _goal_pose(machine, process, goal))[:3, 3])
-    if distance <= _WRONG_UNIT_FACTOR * machine.cell.arms[arm].arm.reach:
+    if distance <= _WRONG_UNIT_FACTOR * reach_of(machine.cell.arms[arm].arm):
         return ()
     unit = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}[machine.code.units.length]
     return (f"`{goal.label}` is {distance:.4g} m away: lengths in this program are {unit}",)

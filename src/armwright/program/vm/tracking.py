@@ -7,6 +7,7 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
+from armwright.arm.reach import tool_speed_of
 from armwright.arrays import Array, Flags
 from armwright.cell.hardware import Mishap
 from armwright.cell.moving_frames import MovingFrame
@@ -66,7 +67,7 @@ def plan_tracking(
         end=last,
         rests=rests,
         cuts=frame.joints - now,
-        shortest=_QUINTIC * distance / model.tool_speed,
+        shortest=_QUINTIC * distance / tool_speed_of(model),
         slower=HIGHEST_SPEED / request.speed,
         period=machine.cell.period,
         fixed=request.duration,
