@@ -64,7 +64,7 @@ def test_a_part_moves_with_the_hand(cell: Cell, rng: np.random.Generator) -> Non
     np.testing.assert_allclose(parts.in_world("BLOCK", grasp), carried, atol=1e-12)
     assert (parts.carrier("BLOCK"), before.carrier("BLOCK")) == (None, "ARM_1")
     track = parts.tracks["BLOCK"]
-    assert (track.times, track.arms) == ((0.0, 1.0, 2.0), (None, "ARM_1", None))
+    assert (track.times, track.carriers) == ((0.0, 1.0, 2.0), (None, "ARM_1", None))
     assert [track.at(time)[0] for time in (0.5, 1.0, 1.5, 2.0, 9.0)] == [None, "ARM_1", "ARM_1", None, None]
 
 

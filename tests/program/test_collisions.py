@@ -121,7 +121,7 @@ def test_wanted_contacts(tmp_path: Path) -> None:
     recording = run(PICK + PLACE, cell)
 
     track = recording.parts["BLOCK"]
-    assert track.arms == (None, "ARM_1", None)
+    assert track.carriers == (None, "ARM_1", None)
     np.testing.assert_allclose(track.poses[-1][:3, 3], (0.40, -0.15, 0.05), atol=1e-6)
     q = recording.streams[0].q[round(2.5 / cell.period)]
     arm, X_HP = track.at(2.5)

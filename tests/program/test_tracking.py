@@ -337,9 +337,13 @@ def test_tools() -> None:
 
 
 def test_the_example() -> None:
-    """Both parts of the example come into the box."""
+    """Both cans of the example come from the belt onto the stand."""
     recording = run(EXAMPLES / "belt.rlo", EXAMPLES / "belt_cell.toml")
 
-    assert [line.split(" is")[0] for line in printed(recording)] == ["part 1", "part 2"]
-    assert all("in the box" in line for line in printed(recording))
+    assert [line.split(" is")[0] for line in printed(recording)] == ["can 1", "can 2"]
+    assert all("on the stand" in line for line in printed(recording))
+    for name, side in (("CAN_1", 0.62), ("CAN_2", 0.54)):
+        track = recording.parts[name]
+        assert track.carriers == ("BELT", "ARM_1", None)
+        np.testing.assert_allclose(track.poses[-1][:3, 3], (0.10, side, 0.20), atol=1e-3)
     check_limits(recording)

@@ -118,7 +118,7 @@ def test_meshes_share_the_page() -> None:
 
 def track(poses: Array, arms: list[str | None]) -> PartTrack:
     times = tuple((np.arange(len(poses)) * 1e-3).tolist())
-    return PartTrack(times=times, arms=tuple(arms), poses=tuple(poses))
+    return PartTrack(times=times, carriers=tuple(arms), poses=tuple(poses))
 
 
 def test_poses_of_a_part_at_rest_are_left_out() -> None:
@@ -546,7 +546,7 @@ def test_the_measured_world_is_drawn(visit, stocked: Recording) -> None:
     )
     # It stands for 1 s, and then goes 0.3 m in 0.02 s.
     ends = homogeneous(np.eye(3), np.array([[0.5, 0, 0.1], [0.5, 0, 0.1], [0.5, 0.3, 0.1], [0.5, 0.3, 0.1]]))
-    falls = PartTrack(times=(0.0, 1.0, 1.02, 2.0), arms=(None,) * 4, poses=tuple(ends))
+    falls = PartTrack(times=(0.0, 1.0, 1.02, 2.0), carriers=(None,) * 4, poses=tuple(ends))
     opened = visit(page_of(observed(stocked, measured=(measured,), parts={"BLOCK": falls})))
 
     def drawn(name: str) -> list[Array]:

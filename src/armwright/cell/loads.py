@@ -42,7 +42,7 @@ def loads_over_time(cell: Cell, name: str, tracks: Mapping[str, PartTrack]) -> l
         name: of the arm.
         tracks: where the parts were, by name.
     """
-    times = sorted({0.0, *(time for track in tracks.values() if name in track.arms for time in track.times)})
+    times = sorted({0.0, *(time for track in tracks.values() if name in track.carriers for time in track.times)})
     loads = []
     for time in times:
         held = [(part, pose) for part, track in tracks.items() for arm, pose in [track.at(time)] if arm == name]

@@ -208,6 +208,10 @@ class Cell:
         """The frames that the camera has answers for."""
         return frozenset({*self.visions, *self.sights})
 
+    def moving_poses(self, time: float) -> dict[str, Array]:
+        """Return the poses (4, 4) in the world of the frames that move by themselves, by name, at a time [s]."""
+        return {name: frame.pose_at(time) for name, frame in self.moving_frames.items()}
+
     @property
     def collisions_matter(self) -> bool:
         """Whether there is anything in the cell that an arm could run into: fixtures, parts or another arm."""

@@ -1,4 +1,4 @@
-"""Where the parts of a cell are believed to be: in the world, or held by an arm."""
+"""Where the parts of a cell are believed to be: in the world, on a frame that moves, or held by an arm."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array, read_only
 from armwright.cell.model import Cell
+from armwright.cell.scene import Part
 from armwright.spatial.poses import inverse
 from armwright.spatial.shapes import Shape, support
 
@@ -22,18 +23,18 @@ class PartTrack:
 
     Attributes:
         times: from when on each of the following holds [s], from 0.
-        arms: the arm that holds the part; None where it is in the world.
-        poses: (4, 4) of the part relative to its tool; in the world where no arm holds it.
+        carriers: the arm that holds the part, or the frame that moves it; None where it lies in the world.
+        poses: (4, 4) of the part relative to the tool or the frame; in the world where nothing carries it.
     """
 
     times: tuple[float, ...]
-    arms: tuple[str | None, ...]
+    carriers: tuple[str | None, ...]
     poses: tuple[Array, ...]
 
     def at(self, time: float) -> tuple[str | None, Array]:
-        """Return the arm that holds the part at a time [s], or None, and its pose on its tool or in the world."""
+        """Return what carries the part at a time [s], or None, and its pose on that or in the world."""
         index = max(int(np.searchsorted(self.times, time, side="right")) - 1, 0)
-        return self.arms[index], self.poses[index]
+        return self.carriers[index], self.poses[index]
 
 
 class PartPoses:
@@ -47,9 +48,7 @@ class PartPoses:
     def __init__(self, cell: Cell) -> None:
         """Put the parts where the cell has them at the start, and open all grippers."""
         self._cell = cell
-        self._tracks = {
-            name: PartTrack(times=(0.0,), arms=(None,), poses=(part.pose,)) for name, part in cell.parts.items()
-        }
+        self._tracks = {name: _track_at_start(cell, part) for name, part in cell.parts.items()}
         self._openings = {name: arm.gripper_or_usual.opening for name, arm in cell.arms.items()}
 
     @classmethod
@@ -64,10 +63,15 @@ class PartPoses:
             openings: distance between the fingers of each arm [m].
         """
         other = cls(cell)
-        other._tracks = {
-            name: PartTrack(times=(0.0,), arms=(arm,), poses=(read_only(X),)) for name, (arm, X) in parts.items()
-        }
+        other._tracks = {name: _first_track(arm, X) for name, (arm, X) in parts.items()}
         other._openings = dict(openings)
+        return other
+
+    @classmethod
+    def standing(cls, cell: Cell) -> PartPoses:
+        """Return parts that all stand where they are at the start, as if no frame moved."""
+        other = cls(cell)
+        other._tracks = {name: _first_track(None, part.pose) for name, part in cell.parts.items()}
         return other
 
     def copy(self) -> PartPoses:
@@ -82,22 +86,22 @@ class PartPoses:
         return dict(self._tracks)
 
     def carrier(self, part: str) -> str | None:
-        """Return the arm that holds a part; None where none does."""
-        return self._tracks[part].arms[-1]
+        """Return the arm that holds a part, or the frame that moves it; None where nothing does."""
+        return self._tracks[part].carriers[-1]
 
     def pose(self, part: str) -> Array:
-        """Return the pose (4, 4) of a part on the tool that holds it; in the world where none does."""
+        """Return the pose (4, 4) of a part on the tool or the frame that carries it; in the world where none does."""
         return self._tracks[part].poses[-1]
 
-    def in_world(self, part: str, hands: Mapping[str, Array]) -> Array:
+    def in_world(self, part: str, carriers: Mapping[str, Array]) -> Array:
         """Return the pose (4, 4) of a part in the world.
 
         Args:
             part: its name.
-            hands: (4, 4) pose of each tool in the world.
+            carriers: (4, 4) pose of each tool, and of each frame that moves, in the world.
         """
-        arm = self.carrier(part)
-        return self.pose(part) if arm is None else hands[arm] @ self.pose(part)
+        carrier = self.carrier(part)
+        return self.pose(part) if carrier is None else carriers[carrier] @ self.pose(part)
 
     def held_by(self, arm: str) -> tuple[str, ...]:
         """Return the parts that an arm holds."""
@@ -107,69 +111,78 @@ class PartPoses:
         """Return the distance between the fingers of an arm [m]."""
         return self._openings[arm]
 
-    def graspable(self, arm: str, tool: Array, hands: Mapping[str, Array]) -> str | None:
+    def graspable(self, arm: str, tool: Array, carriers: Mapping[str, Array]) -> str | None:
         """Return the part that the fingers of an arm would hold if they closed at a pose; None where there is none.
 
         Args:
             arm: its name.
             tool: (4, 4) pose of its tool in the world.
-            hands: (4, 4) pose of each tool in the world.
+            carriers: (4, 4) pose of each tool, and of each frame that moves, in the world.
         """
         within, nearest = self._cell.arms[arm].gripper_or_usual.opening / 2, None
         for name, part in self._cell.parts.items():
-            grasp = self.in_world(name, hands) @ part.grasp
+            grasp = self.in_world(name, carriers) @ part.grasp
             distance = float(np.linalg.norm(grasp[:3, 3] - tool[:3, 3]))
             if distance <= within and grasp[:3, 2] @ tool[:3, 2] >= _COS_MAX_TILT:
                 within, nearest = distance, name
         return nearest
 
-    def close(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> str | None:
+    def close(self, arm: str, carriers: Mapping[str, Array], now: float, width: float | None = None) -> str | None:
         """Let the fingers of an arm close; return the part that they hold from now on, or None.
 
         Args:
             arm: its name.
-            hands: (4, 4) pose of each tool in the world.
+            carriers: (4, 4) pose of each tool, and of each frame that moves, in the world.
             now: the time [s].
             width: to which they close where nothing is between them [m]; 0 when left out.
         """
-        part = self.graspable(arm, hands[arm], hands)
+        part = self.graspable(arm, carriers[arm], carriers)
         self._openings[arm] = min(width or 0.0, self._cell.arms[arm].gripper_or_usual.opening)
         if part is not None:
-            X_HP = inverse(hands[arm]) @ self.in_world(part, hands)
+            X_HP = inverse(carriers[arm]) @ self.in_world(part, carriers)
             self._put(part, arm, X_HP, now)
             self._openings[arm] = width_across(self._cell.parts[part].shape, X_HP)
         return part
 
-    def open(self, arm: str, hands: Mapping[str, Array], now: float, width: float | None = None) -> tuple[str, ...]:
+    def open(self, arm: str, carriers: Mapping[str, Array], now: float, width: float | None = None) -> tuple[str, ...]:
         """Let the fingers of an arm open; return the parts that it has released, which stay where they are.
 
         Args:
             arm: its name.
-            hands: (4, 4) pose of each tool in the world.
+            carriers: (4, 4) pose of each tool, and of each frame that moves, in the world.
             now: the time [s].
             width: to which they open [m]; as far as they can when left out.
         """
         parts = self.held_by(arm)
         for part in parts:
-            self._put(part, None, self.in_world(part, hands), now)
+            self._put(part, None, self.in_world(part, carriers), now)
         opening = self._cell.arms[arm].gripper_or_usual.opening
         self._openings[arm] = opening if width is None else min(width, opening)
         return parts
 
     def see(self, part: str, pose: Array, now: float) -> None:
         """Take note that a part which no arm holds stands at a pose (4, 4) in the world."""
-        if self.carrier(part) is None:
+        if self.carrier(part) not in self._cell.arms:
             self._put(part, None, pose, now)
 
-    def _put(self, part: str, arm: str | None, pose: Array, now: float) -> None:
+    def _put(self, part: str, carrier: str | None, pose: Array, now: float) -> None:
         track = self._tracks[part]
         # Of the same moment the last counts.
         kept = len(track.times) if track.times[-1] < now else len(track.times) - 1
         self._tracks[part] = PartTrack(
             times=(*track.times[:kept], now),
-            arms=(*track.arms[:kept], arm),
+            carriers=(*track.carriers[:kept], carrier),
             poses=(*track.poses[:kept], read_only(pose)),
         )
+
+
+def _track_at_start(cell: Cell, part: Part) -> PartTrack:
+    frame = cell.moving_frames.get(part.on)
+    return _first_track(None, part.pose) if frame is None else _first_track(part.on, inverse(frame.pose) @ part.pose)
+
+
+def _first_track(carrier: str | None, pose: Array) -> PartTrack:
+    return PartTrack(times=(0.0,), carriers=(carrier,), poses=(read_only(pose),))
 
 
 def width_across(shape: Shape, X_HP: Array) -> float:

@@ -96,7 +96,8 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
     standing = _standing(frames, arms)
     scene = top.table("scene")
     fixtures, markers = read_fixtures(scene, standing), read_markers(scene)
-    parts = read_parts(top.table("parts"), {*fixtures, *markers})
+    moving = _read_moving_frames(moves, frames, standing)
+    parts = read_parts(top.table("parts"), moving, {*fixtures, *markers})
     refuse_hidden_markers(top, fixtures, parts, markers)
     cameras = read_cameras(camera, top.table("cameras"), arms)
     sights, visions = read_visions(top.table("visions"), fixtures, parts, markers, cameras)
@@ -106,7 +107,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         arms=arms,
         gravity=_read_gravity(top),
         frames=frames,
-        moving_frames=_read_moving_frames(moves, frames, standing),
+        moving_frames=moving,
         joint_targets=_read_joint_targets(top.table("joint_targets"), arms, frames),
         spreads=spreads,
         fixtures=fixtures,

@@ -83,6 +83,7 @@ class Part:
         mass: [kg].
         friction: coefficient of Coulomb friction of its surface.
         pose: (4, 4) of the solid in the world at the start.
+        on: the frame on which it goes along, which moves by itself; WORLD where it stands.
         spread: how far from there it may be.
         grasp: (4, 4) pose on the part that a tool goes to.
         marker: by which a camera finds it; None where it has none.
@@ -94,6 +95,7 @@ class Part:
     mass: float
     friction: float = 0.8
     pose: Array = attrs.field(converter=one_pose)
+    on: str = WORLD
     spread: Spread = attrs.field(factory=Spread)
     grasp: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     marker: Marker | None = None

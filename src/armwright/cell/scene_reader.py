@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from armwright.arm.solid_entries import shape_in
 from armwright.cell.entries import ARM_NAME, known_name, read_name, read_pose, read_spread, refuse_too_many
 from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.moving_frames import MovingFrame
 from armwright.cell.scene import TABLE, USUAL_CONTACT_TIME, Fixture, Gripper, Marker, Part, table
 from armwright.errors import counted
 from armwright.files.document import Table
@@ -103,15 +104,17 @@ def _table(entry: Table) -> Fixture:
     return result
 
 
-def read_parts(parts: Table, taken: Collection[str] = ()) -> dict[str, Part]:
+def read_parts(parts: Table, moving: Mapping[str, MovingFrame], taken: Collection[str] = ()) -> dict[str, Part]:
     """Read the parts, by name.
 
     Args:
         parts: the table of them.
+        moving: the frames that parts can be on.
         taken: names of bodies and markers of the scene, which no part has.
 
     Raises:
-        FileFormatError: a key is unknown, missing or out of range, or two markers have one number.
+        FileFormatError: a key is unknown, missing or out of range, two markers have one number, or a frame does not
+            exist.
     """
     result: dict[str, Part] = {}
     numbers: dict[int, str] = {}
@@ -128,12 +131,15 @@ def read_parts(parts: Table, taken: Collection[str] = ()) -> dict[str, Part]:
             )
         entry.allow("marker")
         shape = _part_shape(entry)
+        on = known_name(entry, "on", entry.text("on", default=WORLD), [WORLD, *moving], "a frame that moves by itself")
+        start = moving[on].pose if on in moving else np.eye(4)
         result[name] = Part(
             name=name,
             shape=shape,
             mass=_part_mass(entry, shape),
             friction=_friction(entry),
-            pose=read_pose(entry, "at"),
+            pose=start @ read_pose(entry, "at"),
+            on=on,
             spread=read_spread(entry, "spread_mm", "spread_deg"),
             grasp=read_pose(entry, "grasp", np.eye(4)),
             marker=marker,

@@ -192,7 +192,7 @@ class Simulator:
             return np.zeros(6)
         deepest = int(np.argmax(depths))
         force = np.array([0.0, 0.0, depths[deepest] * self._cell.contact.stiffness])
-        lever = self._hands(now)[arm][:3, :3] @ points[deepest].pose[:3, 3]
+        lever = self._carriers(now)[arm][:3, :3] @ points[deepest].pose[:3, 3]
         return np.concatenate([force, np.cross(lever, force)])
 
     def tool_wrenches(self, arm: str, now: float) -> Array:
@@ -288,7 +288,7 @@ class Simulator:
         the plane any more.
         """
         if self._cell.parts:
-            (self._parts.close if closed else self._parts.open)(arm, self._hands(now), now, width)
+            (self._parts.close if closed else self._parts.open)(arm, self._carriers(now), now, width)
         if not closed:
             motion = self._motions[arm]
             is_gripper = [np.allclose(point.pose, np.eye(4), rtol=0, atol=_DEPTH_TOLERANCE) for point in motion.points]
@@ -394,11 +394,12 @@ class Simulator:
         """Return where the parts were."""
         return Observations(parts=self._parts.tracks)
 
-    def _hands(self, now: float) -> dict[str, Array]:
-        """Return the pose (4, 4) of each hand in the world."""
-        return {
+    def _carriers(self, now: float) -> dict[str, Array]:
+        """Return the pose (4, 4) in the world of each hand, and of the frames that move by themselves."""
+        hands = {
             name: arm.base @ forward(arm.arm, self.configuration(name, now)) for name, arm in self._cell.arms.items()
         }
+        return hands | self._cell.moving_poses(now)
 
     def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
@@ -414,7 +415,7 @@ class Simulator:
         if sight is not None and sight.kind == "marker":
             return self._cell.markers[sight.name].pose @ sight.relation, self._cell.vision_time
         if sight is not None:
-            X_WP = self._parts.in_world(sight.name, self._hands(now))
+            X_WP = self._parts.in_world(sight.name, self._carriers(now))
             return X_WP @ self._cell.parts[sight.name].grasp, self._cell.vision_time
         answers = self._answers.get(frame)
         if not answers:

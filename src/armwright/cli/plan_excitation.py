@@ -148,7 +148,7 @@ def _free_check(path: Path, name: str | None, model: "DynamicModel") -> "FreeChe
     moved = next(iter(cell.arms)) if name is None else one_of("arm of the cell", name, cell.arms)
     if cell.arms[moved].arm.n != model.arm.n:
         raise usage_error("--cell", f"expected {moved} to have the {model.arm.n} joints of {model.arm.name}")
-    checks = CellCollisions(cell).at_configurations(PartPoses(cell))
+    checks = CellCollisions(cell).at_configurations(PartPoses.standing(cell))
     others = {key: value.start for key, value in cell.arms.items() if key != moved}
 
     def is_free(q: "np.ndarray") -> bool:

@@ -172,14 +172,21 @@ class ClearanceChecker:
         """The numbers of bodies that may not meet."""
         return [(a, b) for a, b in self._pairs.tolist()]
 
-    def rearranged(self, bodies: Sequence[Body], pairs: Sequence[tuple[int, int]]) -> ClearanceChecker:
+    def rearranged(
+        self,
+        bodies: Sequence[Body],
+        pairs: Sequence[tuple[int, int]],
+        further: Mapping[str, PlacedArm] | None = None,
+    ) -> ClearanceChecker:
         """Return a checker of the same solids, which other links carry or which are at other poses.
 
         Args:
             bodies: in the same order, each with its shape.
             pairs: the numbers of bodies that may not meet.
+            further: more arms that carry bodies, by name.
         """
         other = copy.copy(self)
+        other.arms = {**self.arms, **(further or {})}
         ClearanceChecker._arrange(other, bodies, pairs)
         return other
 

@@ -20,6 +20,7 @@ from armwright.motion.trajectory import Trajectory, hold
 from armwright.physics.cell_bodies import Body, has_solids
 from armwright.physics.clearance import RESOLUTION, ClearanceChecker, Closest, PlacedArm, Window
 from armwright.physics.configuration_checks import ConfigurationChecks
+from armwright.physics.frame_slides import frame_course, slide, slide_base
 from armwright.physics.joint_space import Margins
 from armwright.physics.placed_bodies import CellBodies, Role
 from armwright.physics.planned_move import PlannedMove
@@ -135,7 +136,7 @@ class CellCollisions:
             name: PlacedArm(_PlainArm(arm) if isinstance(arm, Arm) else arm, cell.arms[name].base)
             for name, arm in compiled.items()
         }
-        at_start = PartPoses(cell)
+        at_start = PartPoses.standing(cell)
         bodies = self._bodies.arranged(at_start)
         pairs = self._bodies.pairs(bodies)
         self._checker = ClearanceChecker(self._arms, bodies, pairs)
@@ -161,7 +162,7 @@ class CellCollisions:
     @cached_property
     def checked(self) -> CheckedBodies:
         """What is looked at."""
-        bodies = self._bodies.arranged(PartPoses(self._cell))
+        bodies = self._bodies.arranged(PartPoses.standing(self._cell))
         radii = {name: guessed_radii(arm.arm) for name, arm in self._cell.arms.items() if not has_solids(arm.arm)}
         return CheckedBodies(
             pairs=self._count,
@@ -198,6 +199,7 @@ class CellCollisions:
         parts: PartPoses,
         beside: Mapping[str, frozenset[str]],
         *,
+        now: float = 0.0,
         clearances: bool = True,
     ) -> MoveCheck:
         """Return whether a planned MOVE runs into anything, and how near it comes.
@@ -207,9 +209,10 @@ class CellCollisions:
             others: what every other arm does, from the same time on; an arm at rest holds its position.
             parts: where the parts are.
             beside: by arm, the parts that its fingers may touch.
+            now: when the MOVE begins [s], for frames of the cell that move by themselves.
             clearances: whether they are asked for.
         """
-        contacts = self._contacts(move, others, parts, beside)
+        contacts = self._contacts(move, others, parts, beside, now)
         contact = contacts.first_contact()
         if contact is not None:
             return MoveCheck(collision=self._collision(contacts, contact))
@@ -224,6 +227,7 @@ class CellCollisions:
         parts: PartPoses,
         beside: Mapping[str, frozenset[str]],
         *,
+        now: float = 0.0,
         stage: int,
         goals: ArrayLike,
         speed: float,
@@ -235,6 +239,7 @@ class CellCollisions:
             others: as for ``check``.
             parts: as for ``check``.
             beside: as for ``check``.
+            now: as for ``check``.
             stage: which of its stages, from 0; it goes from one configuration to another.
             goals: (k, n) joint positions that it may end at.
             speed: 1 to 120.
@@ -244,13 +249,13 @@ class CellCollisions:
             IncapableArmError: gravity alone takes more than a joint may give on the path.
             MissingExtraError: OMPL is not installed.
         """
-        contacts = self._contacts(move, others, parts, beside)
+        contacts = self._contacts(move, others, parts, beside, now)
         begin = contacts.starts[stage]
         old = move.stages[stage]
 
         def certify(trajectory: Trajectory) -> Closest | None:
             stages = (*move.stages[:stage], trajectory, *move.stages[stage + 1 :])
-            tried = self._contacts(attrs.evolve(move, stages=stages), others, parts, beside)
+            tried = self._contacts(attrs.evolve(move, stages=stages), others, parts, beside, now)
             contact = tried.first_contact()
             # What comes before and after is looked at by ``check``.
             if contact is None or not begin <= contact.time <= begin + trajectory.duration:
@@ -292,6 +297,7 @@ class CellCollisions:
         others: Mapping[str, Trajectory],
         parts: PartPoses,
         beside: Mapping[str, frozenset[str]],
+        now: float,
     ) -> WantedContacts:
         bodies = self._bodies.arranged(parts)
         pairs = [
@@ -299,8 +305,11 @@ class CellCollisions:
             for i, j in self._bodies.pairs(bodies)
             if move.arm in (bodies[i].arm, bodies[j].arm) and (i, j) not in self._left_out
         ]
-        checker = self._checker.rearranged(bodies, pairs)
-        motions = {**others, move.arm: move.trajectory}
+        frames = self._cell.moving_frames
+        slides = {name: PlacedArm(_PlainArm(slide(name)), slide_base(frame)) for name, frame in frames.items()}
+        courses = {name: frame_course(frame, now, move.trajectory.duration) for name, frame in frames.items()}
+        checker = self._checker.rearranged(bodies, pairs, slides)
+        motions = {**others, **courses, move.arm: move.trajectory}
         known = list(zip(bodies, self._bodies.roles, strict=True))
         around = Surroundings(checker, motions, known, pairs, beside)
         return WantedContacts(move, around, self._cell.arms[move.arm].arm)

@@ -169,4 +169,4 @@ class Log:
 
 def _part_track(rows: Sequence[tuple[float, Array]]) -> PartTrack:
     times, poses = zip(*rows, strict=True)
-    return PartTrack(times=times, arms=(None,) * len(rows), poses=poses)
+    return PartTrack(times=times, carriers=(None,) * len(rows), poses=poses)

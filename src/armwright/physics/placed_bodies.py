@@ -10,6 +10,7 @@ import attrs
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.part_poses import PartPoses
 from armwright.physics.cell_bodies import Body, arm_bodies, has_solids
+from armwright.physics.frame_slides import part_on_slide
 from armwright.physics.hand_solids import gripper_solids
 from armwright.physics.self_collision import self_pairs
 from armwright.spatial.shapes import Solid, convex_solids
@@ -105,9 +106,11 @@ class CellBodies:
             carrier, X = parts.carrier(name), parts.pose(name)
             if carrier is None:
                 bodies.append(Body(name, piece.moved(X)))
-            else:
+            elif carrier in self.cell.arms:
                 arm = self.cell.arms[carrier].arm
                 bodies.append(Body(name, piece.moved(arm.tool @ X), carrier, arm.n))
+            else:
+                bodies.append(Body(name, piece.moved(part_on_slide(self.cell.moving_frames[carrier], X)), carrier, 1))
         return bodies
 
     def pairs(self, bodies: Sequence[Body]) -> list[tuple[int, int]]:
@@ -118,7 +121,7 @@ class CellBodies:
         """
         # What the tool holds is the body after the last link.
         numbers = [
-            self._number_in_hand[body.arm] if body.arm is not None and (role.part or role.in_gripper) else body.link
+            self._number_in_hand.get(body.arm or "", body.link) if role.part or role.in_gripper else body.link
             for body, role in zip(bodies, self.roles, strict=True)
         ]
         pairs = []
@@ -126,6 +129,8 @@ class CellBodies:
             if a.arm is None or a.arm != b.arm:
                 # A base stands, as fixtures do.
                 counts = a.link > 0 or b.link > 0
+            elif a.arm not in self.cell.arms:
+                counts = False
             else:
                 counts = (min(numbers[i], numbers[j]), max(numbers[i], numbers[j])) in self._self_pairs[a.arm]
             if counts:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from itertools import product
 
 from armwright.arrays import integer
+from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
 from armwright.errors import InvalidValueError, KindError, closest, shown
 from armwright.physics.cell_bodies import Body, arm_bodies
@@ -25,7 +26,8 @@ def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
 
     Raises:
         KindError: one of them is of another kind.
-        InvalidValueError: the seed is below 0, a law is for no arm of the cell, or the parts are not those of the cell.
+        InvalidValueError: the seed is below 0, a law is for no arm of the cell, the parts are not those of the cell, or
+            one of them lies on a frame that moves by itself.
     """
     if not isinstance(cell, Cell):
         raise KindError(f"cell: expected a Cell, such as read_cell returns, got {shown(cell)}")
@@ -39,6 +41,12 @@ def check_arguments(cell: Cell, seed: int, laws: object, parts: object) -> None:
             near = closest(name, cell.arms)
             hint = f"; did you mean {near}?" if near else ""
             raise InvalidValueError(f"laws: {name} is no arm of cell '{cell.name}'{hint}")
+    riding = next((part for part in cell.parts.values() if part.on != WORLD), None)
+    if riding is not None:
+        raise InvalidValueError(
+            f"cell '{cell.name}': part {riding.name} lies on {riding.on}, which moves by itself; worlds with physics "
+            "have no such frames: leave out its key `on`, or run without physics"
+        )
     if parts is not None and (not isinstance(parts, Mapping) or parts.keys() != cell.parts.keys()):
         known = ", ".join(cell.parts) or "none"
         raise InvalidValueError(f"parts: expected those of cell '{cell.name}' by name ({known}), got {shown(parts)}")

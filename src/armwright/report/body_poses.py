@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.report.animation import Animation, ArmFigure, Body, MovedPart
-from armwright.spatial.poses import from_noap
+from armwright.spatial.poses import between, from_noap
 
 # What stretches has at least this length [m].
 _FLAT = 1e-6
@@ -84,5 +84,8 @@ def part_poses(part: MovedPart, t: Array, tools: Mapping[str, Array]) -> Array:
     poses = np.empty((len(t), 4, 4))
     for i, row in enumerate(rows.tolist()):
         X, arm = from_noap(part.poses[row]), part.arms[row]
+        if arm is None and part.changes_evenly and part.arms[row + 1 : row + 2] == [None]:
+            begin, end = part.times[row : row + 2]
+            X = between(X, from_noap(part.poses[row + 1]), np.clip((t[i] - begin) / (end - begin), 0.0, 1.0))
         poses[i] = X if arm is None else tools[arm][i] @ X
     return poses

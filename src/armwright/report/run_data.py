@@ -213,10 +213,12 @@ def _rows_at(stream: Stream | MeasuredStream, t: Array) -> Array:
 def _frame_tracks(
     recording: Recording, t: Array, tools: dict[str, Array], names: Sequence[str]
 ) -> Iterator[FrameTrack]:
+    moving = {name: np.stack([frame.pose_at(at) for at in t]) for name, frame in recording.cell.moving_frames.items()}
+    carriers = tools | moving
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
     for _, rows, tree in _valid_trees(recording, t):
-        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: X[rows] for arm, X in tools.items()}}
+        known: dict[str, Array] = {WORLD: np.eye(4), **{name: X[rows] for name, X in carriers.items()}}
         for name in names:
             if _add_world_pose(name, tree, known):
                 poses[name][rows] = known[name]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
-from armwright.cell.part_poses import PartTrack, width_across
+from armwright.cell.part_poses import PartPoses, PartTrack, width_across
 from armwright.cell.scene import Fixture
 from armwright.program.vm.recording import Effect, Recording
 from armwright.report.animation import Body, MovedPart
@@ -23,6 +24,8 @@ from armwright.spatial.shapes import Box
 MAX_BODIES = 400
 # A part that moved less than this since the last pose is drawn there [m], [rad].
 _STILL = 2e-4
+# Poses at which a part is shown while the frame that carries it changes its speed.
+_RAMP_POSES = 17
 # Poses of all parts together on a page at most.
 _MAX_POSES = 12_000
 _DIGITS = 9
@@ -77,9 +80,9 @@ def moved_parts(recording: Recording, shapes: ShapeTable) -> list[MovedPart]:
             name=name,
             shape=shapes.number(recording.cell.parts[name].shape),
             times=[float(track.times[i]) for i in kept],
-            arms=[track.arms[i] for i in kept],
+            arms=[track.carriers[i] for i in kept],
             poses=[to_noap(track.poses[i]) for i in kept],
-            changes_evenly=bool(recording.measured),
+            changes_evenly=bool(recording.measured) or recording.cell.parts[name].on != WORLD,
         )
         for name, track in tracks
         if (kept := kept_poses(track, most))
@@ -87,11 +90,26 @@ def moved_parts(recording: Recording, shapes: ShapeTable) -> list[MovedPart]:
 
 
 def part_tracks(recording: Recording) -> dict[str, PartTrack]:
-    """Return where each part of the cell was during a run, by name: at its start, where nothing is known of it."""
-    start = {
-        name: PartTrack(times=(0.0,), arms=(None,), poses=(part.pose,)) for name, part in recording.cell.parts.items()
-    }
-    return {name: recording.parts.get(name, track) for name, track in start.items()}
+    """Return where each part of the cell was during a run, by name: in the world, or on the hand that held it."""
+    start = PartPoses(recording.cell).tracks
+    return {name: _in_world(recording, recording.parts.get(name, track)) for name, track in start.items()}
+
+
+def _in_world(recording: Recording, track: PartTrack) -> PartTrack:
+    """Return a track with poses in the world, closely enough, where a frame that moves by itself carried the part."""
+    frames, entries = recording.cell.moving_frames, list[tuple[float, str | None, Array]]()
+    ends = [*track.times[1:], max(recording.duration, track.times[-1])]
+    for begin, end, carrier, X in zip(track.times, ends, track.carriers, track.poses, strict=True):
+        if carrier is None or carrier not in frames:
+            entries.append((begin, carrier, X))
+            continue
+        frame = frames[carrier]
+        starts = frame.joints[: len(frame.joints) // 2]
+        ramps = (starts[:, None] + np.linspace(0.0, frame.ramp, _RAMP_POSES)).ravel()
+        moments = np.unique([begin, *ramps[(ramps > begin) & (ramps < end)], end])
+        entries += [(time, None, frame.pose_at(time) @ X) for time in moments.tolist()]
+    times, carriers, poses = zip(*entries, strict=True)
+    return PartTrack(times=times, carriers=carriers, poses=poses)
 
 
 def kept_poses(track: PartTrack, most: int) -> list[int]:
@@ -105,7 +123,7 @@ def kept_poses(track: PartTrack, most: int) -> list[int]:
         most: poses at most, beside the changes of the arm.
     """
     count = len(track.times)
-    changes = [i for i in range(count) if i in (0, count - 1) or track.arms[i] != track.arms[i - 1]]
+    changes = [i for i in range(count) if i in (0, count - 1) or track.carriers[i] != track.carriers[i - 1]]
     kept, last = set(changes), 0
     moved = []
     for i in range(1, count):
@@ -156,7 +174,7 @@ def _held_width(recording: Recording, tracks: Mapping[str, PartTrack], grasp: Ef
     widths = [0.0]
     for name, track in tracks.items():
         i = int(np.searchsorted(track.times, grasp.t1 + 1e-9, side="right")) - 1
-        if i >= 0 and track.arms[i] == grasp.arm:
+        if i >= 0 and track.carriers[i] == grasp.arm:
             widths.append(width_across(recording.cell.parts[name].shape, track.poses[i]))
     return max(widths)
 
@@ -188,7 +206,7 @@ def part_data(recording: Recording) -> dict[str, Any]:
 
 def _track_data(track: PartTrack, kept: Sequence[int]) -> Iterator[dict[str, Any]]:
     for i in kept:
-        yield {"from": float(track.times[i]), "arm": track.arms[i], "pose": _numbers(track.poses[i])}
+        yield {"from": float(track.times[i]), "arm": track.carriers[i], "pose": _numbers(track.poses[i])}
 
 
 def _numbers(X: Array) -> list[float]:

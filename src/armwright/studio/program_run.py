@@ -324,7 +324,10 @@ class ProgramRun:
         """Return the frame tree at the time that is shown."""
         trees = self._computed.trees
         i = bisect_right(trees, self.time + _SAME, key=lambda entry: entry[0]) - 1
-        return trees[max(i, 0)][1]
+        tree = trees[max(i, 0)][1]
+        for name, X in self._cell.moving_poses(self.time).items():
+            tree = tree.set_pose(name, X)
+        return tree
 
     def spelled(self, frame: str) -> str:
         """Return a frame as the program spells it."""
@@ -335,7 +338,11 @@ class ProgramRun:
         hardware, time = self._computed.machine.hardware, self.time + _SAME
         if isinstance(hardware, PhysicsCell):
             return {name: (None, hardware.part_pose(name, time)) for name in self._cell.parts}
-        return {name: track.at(time) for name, track in hardware.part_poses().tracks.items()}
+        moving, parts = self._cell.moving_poses(self.time), dict[str, tuple[str | None, Array]]()
+        for name, track in hardware.part_poses().tracks.items():
+            carrier, X = track.at(time)
+            parts[name] = (None, moving[carrier] @ X) if carrier in moving else (carrier, X)
+        return parts
 
     def inputs(self) -> dict[str, float]:
         """Return what the inputs of the cell are at the time that is shown."""

@@ -54,7 +54,7 @@ class Workbench:
         self.cell = cell
         self.arms = {name: LiveArm(name, arm) for name, arm in cell.arms.items()}
         self.ready = False
-        self._parts = PartPoses(cell)
+        self._parts = PartPoses.standing(cell)
         self._tree = cell.tree()
         # How the program that is shown spells a frame.
         self._spelled: Callable[[str], str] = str
@@ -246,7 +246,7 @@ class Workbench:
         """Put arms, parts and frames to where they are at the start of the cell."""
         for arm in self.arms.values():
             arm.q = np.array(arm.placed.start)
-        self._parts, self._tree, self._spelled = PartPoses(self.cell), self.cell.tree(), str
+        self._parts, self._tree, self._spelled = PartPoses.standing(self.cell), self.cell.tree(), str
         self._checks = self._followed = None
         self._changes += 1
 

@@ -55,7 +55,7 @@ def checked_stages(
     move = PlannedMove(
         arm=arm,
         stages=tuple(stage.trajectory for stage, _ in planned),
-        goal_part=_goal_part(machine, arm, planned[-1][0].trajectory),
+        goal_part=_goal_part(machine, arm, [stage.trajectory for stage, _ in planned]),
         after_force=hand.pressed,
         on_force=any(guard.reads_force for guard in request.guards),
     )
@@ -90,7 +90,7 @@ def _path_past(machine: Machine, speed: float, move: PlannedMove, stage: int, go
     assert collisions is not None  # noqa: S101 - asked for only then
     others, beside = _surroundings(machine, move.arm)
     parts = machine.hardware.part_poses()
-    return collisions.path_past(move, others, parts, beside, stage=stage, goals=goals, speed=speed)
+    return collisions.path_past(move, others, parts, beside, now=machine.now, stage=stage, goals=goals, speed=speed)
 
 
 def _with_failure(error: RunError, failure: str) -> RunError:
@@ -99,17 +99,19 @@ def _with_failure(error: RunError, failure: str) -> RunError:
     return RunError(attrs.evolve(error.diagnostic, notes=notes), error.tree, error.time)
 
 
-def _goal_part(machine: Machine, arm: str, last: Trajectory) -> str | None:
+def _goal_part(machine: Machine, arm: str, stages: Sequence[Trajectory]) -> str | None:
     """Return the part that a MOVE goes to; an arm that holds one goes to no other."""
     parts = machine.hardware.part_poses()
     if not machine.cell.parts or parts.held_by(arm):
         return None
-    X_WT = machine.base_pose(arm) @ forward(machine.cell.arms[arm].arm, last(last.duration))
-    return parts.graspable(arm, X_WT, _hands(machine))
+    end = machine.now + sum(stage.duration for stage in stages)
+    X_WT = machine.base_pose(arm) @ forward(machine.cell.arms[arm].arm, stages[-1](stages[-1].duration))
+    return parts.graspable(arm, X_WT, _carriers(machine, end))
 
 
-def _hands(machine: Machine) -> dict[str, Array]:
-    return {name: machine.gripper_pose(name) for name in machine.cell.arms}
+def _carriers(machine: Machine, time: float) -> dict[str, Array]:
+    """Return the poses of the hands now, and of the frames that move by themselves at a time [s]."""
+    return {name: machine.gripper_pose(name) for name in machine.cell.arms} | machine.cell.moving_poses(time)
 
 
 def _check(machine: Machine, move: PlannedMove, *, clearances: bool = True) -> MoveCheck:
@@ -117,7 +119,7 @@ def _check(machine: Machine, move: PlannedMove, *, clearances: bool = True) -> M
     collisions = machine.collisions
     assert collisions is not None  # noqa: S101 - asked for only then
     others, beside = _surroundings(machine, move.arm)
-    return collisions.check(move, others, machine.hardware.part_poses(), beside, clearances=clearances)
+    return collisions.check(move, others, machine.hardware.part_poses(), beside, now=machine.now, clearances=clearances)
 
 
 def _surroundings(machine: Machine, arm: str) -> tuple[dict[str, Trajectory], dict[str, frozenset[str]]]:
@@ -207,7 +209,7 @@ def _rest_of_move(machine: Machine, motion: Motion, stages: Sequence[Trajectory]
     return PlannedMove(
         arm=motion.arm,
         stages=tuple(stages),
-        goal_part=_goal_part(machine, motion.arm, stages[-1]),
+        goal_part=_goal_part(machine, motion.arm, stages),
         on_force=on_force or machine.state.hands[motion.arm].pressed,
     )
 

@@ -47,8 +47,8 @@ function gripOf(figure, [i, j, s]) {
 }
 
 // Where a part is in the world, or on the hand that holds it: at its last pose, or on the way to the next one.
-function partPose({ times, poses, changes_evenly }, last, t) {
-  if (!changes_evenly || last + 1 === times.length) return poses[last];
+function partPose({ times, poses, arms, changes_evenly }, last, t) {
+  if (!changes_evenly || last + 1 === times.length || arms[last + 1] !== null) return poses[last];
   return blend(poses, [last, last + 1, Math.max(0, (t - times[last]) / (times[last + 1] - times[last]))]);
 }
 
