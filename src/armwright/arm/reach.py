@@ -13,9 +13,9 @@ USUAL_TOOL_SPEED = 1.0
 
 
 def stretched_length(arm: Arm) -> float:
-    """Return how far the tool would be from the base if the arm were straight [m]; never less than its reach.
+    """Return how far the tool would be from the base if the arm were straight [m]; farther away it never is.
 
-    A slide without a limit counts as drawn in; an arm without any length is 1 m long.
+    A slide without a limit counts as drawn in; an arm with one may come farther. An arm without any length is 1 m long.
     """
     spans = (joint.span(_farthest(joint)) for joint in arm.joints)
     return float(sum(spans) + np.linalg.norm(arm.tool[:3, 3])) or 1.0

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.reach import stretched_length
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward, link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, pose_errors, rank
@@ -106,7 +107,7 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         by the additive recurrence of Roberts (2018).
     """
     limited = _Task(arm=arm, X=X, lower=arm.limits.lower, upper=arm.limits.upper)
-    tried, reached = _search(limited, near)
+    tried, reached = _search(limited, near, rounds=1 if _is_too_far(arm, X) else _ROUNDS)
     if not len(reached):
         free = _unlimited(arm, X)
         more = _descend(free, np.concatenate([tried, _starts(limited, near, 0, _STARTS)]))
@@ -179,10 +180,16 @@ def _unlimited(arm: Arm, X: Array) -> _Task:
     return _Task(arm=arm, X=X, lower=-endless, upper=endless)
 
 
-def _search(task: _Task, near: Array) -> tuple[Array, Array]:
+def _is_too_far(arm: Arm, X: Array) -> bool:
+    """Whether a pose is farther away than an arm of turning joints is long, so that more starts are no use."""
+    away = float(np.linalg.norm(X[:3, 3] - arm.base[:3, 3]))
+    return all(joint.revolute for joint in arm.joints) and away > stretched_length(arm)
+
+
+def _search(task: _Task, near: Array, rounds: int = _ROUNDS) -> tuple[Array, Array]:
     """Return all configurations (k, n) that the descents ended in, and those (l, n) that meet the pose."""
     tried = reached = np.empty((0, task.arm.n))
-    for number in range(_ROUNDS):
+    for number in range(rounds):
         ends = _descend(task, _starts(task, near, number * _STARTS, _STARTS))
         fresh = _reaching(task, ends)
         known = [Candidate(q, "") for q in reached]
