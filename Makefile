@@ -32,6 +32,11 @@ $(VENV)/docs: pyproject.toml $(CONSTRAINTS)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@ $(VENV)/core
 
+$(VENV)/examples: pyproject.toml $(CONSTRAINTS)
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[export,physics,sweep,clearance,calibration,identification]'
+	@touch $@ $(VENV)/core
+
 demo: $(VENV)/core   ## Run the report's stacking program and write its report page
 	$(BIN)/armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out/stacking
 
@@ -48,7 +53,7 @@ proof: $(VENV)/test  ## Run every random sample at its full size and write docs/
 	OPENBLAS_NUM_THREADS=1 ARMWRIGHT_PROOF=$(CURDIR)/out/proof $(BIN)/python -m pytest -n auto -m proof --timeout 0 $(ONLY); status=$$?; \
 	    $(BIN)/python docs/make_proof.py out/proof && exit $$status
 
-examples: $(VENV)/core   ## Run every example into out/
+examples: $(VENV)/examples   ## Run every example into out/
 	$(BIN)/armwright run examples/bench.rlo --cell examples/stanford_cell.toml -o out/bench
 	$(BIN)/armwright run examples/twelve_moves.rlo --cell examples/stanford_cell.toml -o out/twelve_moves
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
@@ -56,13 +61,12 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/around.rlo --cell examples/puma_cell.toml --around via -o out/around
 	$(BIN)/armwright run examples/palletise.rlo --cell examples/stanford_cell.toml -o out/palletise
 	$(BIN)/armwright run examples/weld.rlo --cell examples/stanford_cell.toml -o out/weld
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[export]'
+	$(BIN)/armwright run examples/belt.rlo --cell examples/belt_cell.toml -o out/belt
 	$(BIN)/armwright export urscript examples/palletise.rlo --cell examples/ur5_cell.toml -o out/ur5
 	$(BIN)/armwright export ros2 examples/weld.rlo --cell examples/ur5_cell.toml -o out/ros2
 	$(BIN)/armwright run examples/peg.rlo --cell examples/peg_cell.toml -o out/peg
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[physics]'
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/hand_over_cell.toml --physics -o out/hand_over_nest
 	$(BIN)/armwright run examples/insert_peg.rlo --cell examples/socket_cell.toml --physics --seed 1 -o out/insert_peg
 	$(BIN)/armwright run examples/stack_by_vision.rlo --cell examples/vision_cell.toml --physics --seed 1 -o out/stack_by_vision
@@ -70,7 +74,6 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 	$(BIN)/python examples/measurements.py out
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sweep,clearance,calibration]'
 	$(BIN)/python examples/five_bar.py out
 	$(BIN)/armwright clearance simulate five-bar --path y1 -o out/rattling
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_rest.csv
@@ -81,7 +84,6 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/python examples/tracked_points.py out
 	$(BIN)/armwright calibrate puma560-seed examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[identification]'
 	$(BIN)/python examples/logged_motion.py out
 	$(BIN)/armwright identify puma560 examples/puma_log.csv --check examples/puma_check.csv -o out/identified
 
