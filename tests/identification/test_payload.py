@@ -49,6 +49,18 @@ def test_friction_that_has_changed_is_no_load(rng: np.random.Generator) -> None:
     assert found.as_data()["mass"] == found.load.mass
 
 
+def test_swapped_efforts_are_refused(rng: np.random.Generator) -> None:
+    """Efforts under the names of other joints, or counted the other way, are no load."""
+    arm = truth()
+    measured = log(payload(arm, LOAD.mass, LOAD.com, LOAD.inertia), rng)
+    turned = measured.effort * np.where(np.arange(arm.n) == 1, -1.0, 1.0)
+
+    with pytest.raises(ContradictionError, match="joint 2 and joint 3 look swapped"):
+        identify_payload(arm, [attrs.evolve(measured, effort=measured.effort[:, [0, 2, 1, *range(3, arm.n)]])])
+    with pytest.raises(ContradictionError, match="joint 2 look reversed"):
+        identify_payload(arm, [attrs.evolve(measured, effort=turned)])
+
+
 def test_no_load_is_said_to_be_none(rng: np.random.Generator) -> None:
     """Efforts of the arm alone, or of gains that are too small, show no load."""
     arm = truth()

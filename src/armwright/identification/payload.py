@@ -18,7 +18,7 @@ from armwright.dynamics.payloads import payload
 from armwright.dynamics.regressors import OF_LINK
 from armwright.errors import ContradictionError, UnsupportedArmError
 from armwright.files.result_table import ResultTable
-from armwright.identification.checks import log_warnings, refuse_other_units
+from armwright.identification.checks import log_warnings, refuse_other_units, refuse_swapped
 from armwright.identification.equations import equations
 from armwright.identification.feasible import Measured, ball, link_of, possible_bodies
 from armwright.identification.fitting import Fit, robust, summed
@@ -160,7 +160,7 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
         MissingExtraError: Clarabel is not installed.
         TooFewError: too little motion is left.
         UnsupportedArmError: no motion of the arm tells all of a load.
-        ContradictionError: the efforts ask for a load of less than nothing.
+        ContradictionError: the efforts ask for a load of less than nothing, or those of joints are swapped or reversed.
     """
     n = arm.n
     model = DynamicModel(arm=arm, terms=_CHANGED)
@@ -172,6 +172,8 @@ def identify_payload(arm: Arm, logs: Sequence[Log], preparation: Preparation | N
     notes = tuple(log_warnings(arm, logs))
     logs = [log.moving() for log in logs]
     preparation = preparation or preparation_of(logs)
+    whole = DynamicModel(arm=arm)
+    refuse_swapped(whole, list(equations(whole, motions(logs, preparation), preparation.decimation)))
     without = compile_arm(arm).inverse_dynamics
     residuals = [
         motion._replace(tau=motion.tau - without(motion.q, motion.qd, motion.qdd))
