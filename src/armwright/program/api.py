@@ -339,6 +339,10 @@ def pause_garbage_collection() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            # What has been made is old at once, without being looked at; nothing that somebody else froze is touched.
+            if not gc.get_freeze_count():
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
