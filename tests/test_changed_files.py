@@ -28,6 +28,7 @@ SLOW = ("step", "world")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.share(0.03)
 @pytest.mark.parametrize("target", FUZZ.TARGETS)
+@pytest.mark.drawn(0.4)
 def test_changed_files(target: str, sample: Sample, tmp_path: Path) -> None:
     """Keys, numbers, lines and cells changed, lost, doubled, nested: no reader raises anything but its own error."""
     suffix, _, texts = FUZZ.TARGETS[target]

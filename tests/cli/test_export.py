@@ -29,6 +29,7 @@ END.
         ("csv", "urscript", {"ARM_1.csv", "events.json"}),
     ],
 )
+@pytest.mark.drawn(0.5)
 def test_files_of_each_target(target: str, cell: str, files: set[str], tmp_path: Path) -> None:
     """The folder has the files of the target, their proof and the record of the command."""
     done = armwright("export", target, PALLETISE, "--cell", CELLS[cell], "--mode", "plan", "-o", tmp_path / "out")

@@ -131,6 +131,7 @@ def test_the_table_is_whole() -> None:
 
 @pytest.mark.parametrize("construct", PROGRAMS)
 @pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.drawn(0.3)
 def test_cells_of_the_table(target: str, construct: str, recorded: Callable[[str, str], Recording]) -> None:
     """What the table says is in the files, or is the code of the refusal."""
     said = TABLE[construct][TARGETS.index(target)]

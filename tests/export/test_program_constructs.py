@@ -95,6 +95,7 @@ def test_the_table_is_whole() -> None:
 
 @pytest.mark.parametrize("construct", PROGRAMS)
 @pytest.mark.parametrize("target", CELLS)
+@pytest.mark.drawn(0.4)
 def test_cells_of_the_table(target: str, construct: str, tmp_path: Path) -> None:
     """What the table says is in the file, which does what the run did, or is the code of the refusal."""
     said = TABLE[construct][TARGETS.index(target)].strip("`")

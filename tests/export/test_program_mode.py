@@ -48,6 +48,7 @@ def main_text(target: str, text: str) -> str:
 
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("target", CELLS)
+@pytest.mark.drawn(0.4)
 def test_examples(target: str, name: str) -> None:
     """Seven of the examples for one arm go out to each language, and the machine does what the run did."""
     worst = {one.quantity: one for one in exported(target, name).proof.comparisons}
@@ -135,6 +136,7 @@ def test_the_file_as_it_is_has_no_fault(target: str) -> None:
 
 
 @pytest.mark.parametrize(("target", "old", "new"), [(target, *one) for target, ones in FAULTS.items() for one in ones])
+@pytest.mark.drawn(0.5)
 def test_planted_faults_are_found(target: str, old: str, new: str) -> None:
     """A loop that ends too soon, a tray 20 µm aside, a choice the other way round, a gripper that stays open."""
     text = main_text(target, "sort")

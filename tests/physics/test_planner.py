@@ -72,6 +72,7 @@ def test_cluttered_cells(name: str, sample: Sample) -> None:
     assert missed <= 0.02 * solvable
 
 
+@pytest.mark.share(0.05)
 @pytest.mark.proof
 def test_within_limits(sample: Sample) -> None:
     """A planned motion rests at its ends, keeps speeds, accelerations and efforts, and takes as long as asked for."""

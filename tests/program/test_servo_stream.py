@@ -80,6 +80,7 @@ def recorded(text: str, cell: Cell) -> tuple[Recording, RunError | None]:
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.rlo")))
+@pytest.mark.drawn(0.3)
 def test_examples_by_differences(name: str) -> None:
     """In motion.csv of every example all limits hold from tick to tick, and qd and qdd are the derivatives."""
     cell = attrs.evolve(read_cell(EXAMPLES / f"{CELLS[name]}.toml"), around="via" if name == "around" else None)

@@ -77,6 +77,7 @@ def write(mesh: trimesh.Trimesh, path: Path, *, text: bool = False) -> None:
 
 @pytest.mark.share(0.07)
 @pytest.mark.parametrize("ending", ["stl", "text.stl", "obj", "glb", "gltf"])
+@pytest.mark.drawn(0.4)
 def test_solids_of_known_form(ending: str, sample: Sample, tmp_path: Path) -> None:
     """A plate with a hole, a cylinder and a torus, anywhere, keep volume and tensor in every format and unit."""
     worst = 0.0
@@ -124,6 +125,7 @@ def test_solids_of_known_form(ending: str, sample: Sample, tmp_path: Path) -> No
         ("torus", of_torus(0.05, 0.012)),
     ],
 )
+@pytest.mark.drawn(0.5)
 def test_step(name: str, expected: tuple[float, np.ndarray]) -> None:
     """STEP is in the unit that it says, its faces are joined to a closed mesh, and round surfaces are near."""
     pytest.importorskip("cascadio")

@@ -1,6 +1,7 @@
 """The input lines of a session: from a terminal with history and completion, or from a file or pipe."""
 
 import contextlib
+import io
 import signal
 import sys
 from collections.abc import Iterator
@@ -31,7 +32,9 @@ class Script:
 
     def __init__(self) -> None:
         """Begin with the first line, which may have a byte order mark; other bytes are replaced by a character."""
-        cast("TextIOWrapper", sys.stdin).reconfigure(encoding="utf-8-sig", errors="replace", newline="\n")
+        # An input of which something has been read, such as a program, keeps its encoding.
+        with contextlib.suppress(io.UnsupportedOperation):
+            cast("TextIOWrapper", sys.stdin).reconfigure(encoding="utf-8-sig", errors="replace", newline="\n")
 
     def readline(self) -> str:
         """Return the next line with its end; an empty text at the end of the input.
