@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TypeAlias
 
 import attrs
@@ -155,8 +155,7 @@ class DynamicModel:
         if "stribeck" in self.terms:
             # Stribeck friction shows at low speeds only.
             qd[::2] *= self.stribeck_speed
-        # Compiled it would take longer, for so few states.
-        Y = self._columns(q, qd, qdd, link_columns=partial(regressor, _skeleton(self.arm))).reshape(-1, len(self.names))
+        Y = self._columns(q, qd, qdd, link_columns=partial(_few_link_columns, self.arm)).reshape(-1, len(self.names))
         columns, combinations = independent_columns(Y, [*link_order(n), *range(of_links, len(self.names))])
         return BaseParameters(
             columns=columns, names=tuple(self.names[k] for k in columns), combinations=read_only(combinations)
@@ -185,6 +184,17 @@ class BaseParameters:
 def _motors_by_joints(arm: Arm) -> Array:
     """Return the positions of the motors by those of the joints, (n, n), as the arm has them."""
     return np.eye(arm.n) if arm.coupling is None else arm.coupling.inverse
+
+
+def _few_link_columns(arm: Arm, q: Array, qd: Array, qdd: Array) -> Array:
+    """Return the regressor at a few states, for which compiling it would take longer."""
+    return _regressor_at(_skeleton(arm), q.tobytes(), qd.tobytes(), qdd.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _regressor_at(arm: Arm, *motion: bytes) -> Array:
+    """Return the regressor of an arm, which models of it with other terms ask for at the same states."""
+    return read_only(regressor(arm, *(np.frombuffer(values).reshape(-1, arm.n) for values in motion)))
 
 
 def _skeleton(arm: Arm) -> Arm:
