@@ -60,6 +60,7 @@ PROGRAMS = {
     "READ VISIONS": "READ VISIONS (c) ; MOVE ARM_1 TO c ;",
     "HALT": "HALT ;",
     "MOVE with TRACKING": "MOVE ARM_1 TO b * XYZ(0, 0, -10) WITH TRACKING = belt ;",
+    "QUEUE, PUT": "QUEUE ARM_1 DO PUT b TO ARM_1 ;",
     "MOVE with ON": "MOVE ARM_1 TO b STRAIGHTLY, ON DIST(ARM_1, b) < 5 DO HALT ;",
     "OPEN to a width": "OPEN ARM_1 TO 40mm ;",
     "TRY, RECOVER, RAISE": "TRY RAISE odd ; RECOVER PAUSE 0.1 ; END ;",

@@ -75,6 +75,7 @@ def test_run_time_pages_run() -> None:
         "E407",
         "E408",
         "E409",
+        "E410",
         "E504",
         "E505",
         "E506",

@@ -29,6 +29,7 @@ CELLS = {
     "palletise": "stanford_cell",
     "weld": "stanford_cell",
     "sort": "ur5_cell",
+    "seam": "ur5_cell",
     "fetch": "stanford_cell",
     "belt": "belt_cell",
     "gearbox": "puma_cell",

@@ -92,6 +92,9 @@ class Op(enum.StrEnum):
     OUTPUT = "OUTPUT", "T=w"  # to, device: whether it is on
     SETTING = "SETTING", "N=w"  # to, device: what it is set to
     TIMER = "TIMER", "N=w"  # to, timer: its seconds
+    QUEUED = "QUEUED", "N=w"  # to, arm: how many frames of its queue are ahead of it
+    CAPACITY = "CAPACITY", "N=w"  # to, arm: how many there may be
+    AWAITED = "AWAITED", "P=wN"  # to, arm, number: one of them, 1 for the next
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
     AFFIX = "AFFIX", "FF(r)"  # child, parent[, RIGIDLY]: hang on, where both stand now
@@ -128,6 +131,9 @@ class Op(enum.StrEnum):
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
+    QUEUE = "QUEUE", "wNNNN"  # arm, capacity, speed, velocity, blend, -1 for none: its queue is opened
+    PUT = "PUT", "wP(j)"  # arm, frame[, place when the queue is full]: one frame more
+    QUEND = "QUEND", "w"  # arm: stop at the last frame, and close the queue
     # control
     JMP = "JMP", "j"  # place
     JZ = "JZ", "Tj"  # truth value, place: go there when it is false
@@ -171,6 +177,10 @@ MOVE_PARTS = frozenset(
         *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVTRK, Op.MVON),
     )
 )
+
+
+# What stands for a clause of QUEUE that is left out.
+LEFT_OUT = -1.0
 
 
 @attrs.frozen

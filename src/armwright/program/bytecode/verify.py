@@ -424,6 +424,7 @@ _RULES: Mapping[Op, Rule] = {
     Op.DISARM: _disarm,
     Op.UNTIL: _until,
     Op.AWAIT: lambda verifier, state: Flow(state, (verifier.targets[0], state)),
+    Op.PUT: lambda verifier, state: Flow(state, next(((target, state) for target in verifier.targets), None)),
     Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,

@@ -55,7 +55,7 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     plausibility.check_lengths(state, *targets)
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
-            _check_speed(state, clause.value)
+            check_speed(state, clause.value)
         elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
             require_value(state, clause.value)
         elif isinstance(clause, tree.Tracking):
@@ -212,7 +212,8 @@ def _check_tracking(state: FlowState, clause: tree.Tracking) -> None:
     state.report("E249", text, clause.point.span, "nothing to track", note=note, advice=advice)
 
 
-def _check_speed(state: FlowState, node: tree.Expression) -> None:
+def check_speed(state: FlowState, node: tree.Expression) -> None:
+    """Check that a SPEED has a value, one in the range of speeds where it is known."""
     require_value(state, node)
     known = state.number(node)
     if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):

@@ -84,6 +84,26 @@ def checked_stages(
     ]
 
 
+def refuse_collision(
+    machine: Machine, process: Process, arm: str, trajectory: Trajectory, goal_at: tuple[str, Span]
+) -> None:
+    """Look whether an arm that runs on along its queue would run into something.
+
+    Raises:
+        RunError: it would.
+    """
+    if machine.collisions is None:
+        return
+    hand = machine.state.hands[arm]
+    goal_part = _goal_part(machine, arm, trajectory)
+    move = PlannedMove(arm=arm, stages=(trajectory,), goal_part=goal_part, after_force=hand.pressed, on_force=False)
+    collision = _check(machine, move, clearances=False).collision
+    if collision is not None:
+        raise _error(machine, process, collision, arm, goal_at)
+    held = machine.hardware.part_poses().held_by(arm)
+    hand.beside, hand.pressed = frozenset({goal_part} if goal_part else ()) | hand.beside - set(held), False
+
+
 def _path_past(machine: Machine, speed: float, move: PlannedMove, stage: int, goals: Array) -> PlannedPath:
     """Plan a path instead of a stage of a MOVE."""
     collisions = machine.collisions

@@ -46,6 +46,7 @@ from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.moves_ahead import fits, goes_over, merged
 from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
+from armwright.program.vm.queues import require_no_queue
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
 from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, rest_of_following, stop_following
@@ -71,6 +72,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     moved = machine.resolve_name(process, request.begin.operands[0])
     arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim_arm(process, arm, step.span, moved)
+    require_no_queue(machine, process, arm, step.span)
     _require_idle_arm(machine, process, arm, step.span)
     if arm in machine.state.following and request.tracked is None:
         stop_following(machine, process, arm, step.span)
@@ -129,7 +131,7 @@ def _begin_move(
     machine.state.idle_steps += _STEPS_PER_MOVE
     tracking = None
     if request.tracked is not None:
-        stage, tracking = plan_tracking(machine, process, request, (arm, moved), _planner(machine, arm))
+        stage, tracking = plan_tracking(machine, process, request, (arm, moved), planner_of(machine, arm))
         planned: list[tuple[PlannedStage, tuple[str, ...]]] = [(stage, (request.form.goal,))]
     else:
         planned = _plan_stages(machine, process, request, arm, moved)
@@ -312,7 +314,7 @@ def _plan_stages(
         speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
     )
     try:
-        stages = plan(_planner(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
+        stages = plan(planner_of(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except FlatArcError as error:
@@ -327,7 +329,7 @@ def _plan_stages(
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 
 
-def _planner(machine: Machine, arm: str) -> AnyArm:
+def planner_of(machine: Machine, arm: str) -> AnyArm:
     """Return what a MOVE is planned with: the functions of the arm, and the efforts of what it holds as well."""
     own, loaded = machine.cell.arms[arm].arm, machine.loaded_arm(arm)
     if loaded is own:

@@ -16,6 +16,7 @@ from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
 
 if TYPE_CHECKING:
+    from armwright.motion.frame_queue import FrameQueue, Pace
     from armwright.physics.collisions import Collision, StageClearance
     from armwright.physics.planner import PlannedPath
     from armwright.program.vm.move_request import MoveRequest
@@ -56,6 +57,7 @@ class TryBlock:
         lock_count: how many locks the process held when it began.
         kinds: of the errors that it recovers from; empty for all.
         watch_count: how many WHENs the process had armed or disarmed when it began.
+        queue_count: how many queues it had opened.
     """
 
     start: int
@@ -64,6 +66,7 @@ class TryBlock:
     lock_count: int
     kinds: tuple[str, ...] = ()
     watch_count: int = 0
+    queue_count: int = 0
 
     def recovers_from(self, kind: str) -> bool:
         """Whether it recovers from a kind of error: not where it has failed already."""
@@ -370,6 +373,35 @@ class MovesAhead:
     implied_affix: bool = False
 
 
+@attrs.frozen(kw_only=True, eq=False)
+class RingQueue:
+    """The open queue of an arm.
+
+    Attributes:
+        arm: the arm.
+        span: the statement.
+        capacity: how many frames may be ahead of the arm.
+        pace: how fast it is run.
+        start: when it was opened.
+        path: on which the arm runs; None before the first frame.
+        labels: of the frames that were put in, as the program writes them, those that are passed too.
+        frames: (4, 4) their poses in the world.
+    """
+
+    arm: str
+    span: Span
+    capacity: int
+    pace: Pace
+    start: StartTime
+    path: FrameQueue | None = None
+    labels: tuple[str, ...] = ()
+    frames: tuple[Array, ...] = ()
+
+    def ahead(self, now: float) -> int:
+        """Return how many frames the arm has not passed."""
+        return 0 if self.path is None else len(self.labels) - self.path.passed(now)
+
+
 @attrs.frozen
 class WaitReason:
     """Why a process does not go on.
@@ -435,6 +467,7 @@ class Process:
         message: of the error that it recovered from last.
         watches: the WHENs of the blocks that it is in, in the order of arming.
         judged_tick: when it has judged them last [ticks].
+        queues: the arms whose queues it has opened, in the order of opening.
     """
 
     path: tuple[int, ...] = ()
@@ -455,6 +488,7 @@ class Process:
     message: str = ""
     watches: list[Watch] = attrs.field(factory=list)
     judged_tick: int = -1
+    queues: list[str] = attrs.field(factory=list)
 
     @property
     def activation(self) -> Activation:

@@ -18,7 +18,9 @@ from armwright.program.vm.process import Course, EarlyEnd, Interruption, Motion,
 from armwright.program.vm.synchronization import record_wait
 
 # Values that change without a statement of the program.
-_READS_OUTSIDE = frozenset((Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.TIMER))
+_READS_OUTSIDE = frozenset(
+    (Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.TIMER, Op.QUEUED, Op.AWAITED)
+)
 # An arm so near to where it was braked has not been moved since [rad] or [m].
 _SAME_CONFIGURATION = 1e-9
 # No stage begins then: its path is checked for collisions anew.
