@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.dynamics import inverse_dynamics
 from armwright.kinematics import forward
-from armwright.motion.frame_queue import NEAR, WINDOW, FrameQueue, Pace
+from armwright.motion.frame_queue import NEAR, FrameQueue, Pace
 from armwright.motion.limited import limited_motion
 from armwright.motion.obstruction import PathError
 from armwright.motion.trajectory import Trajectory
@@ -214,4 +214,3 @@ def test_out_of_reach() -> None:
     assert not runner.put(far)
     assert runner.queue is before
     assert before.rests(0.0)
-    assert before.end + WINDOW > 0

@@ -24,7 +24,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "QUEUEKEY": ("CAPACITY", "speed", "VELOCITY", "Blend"),
     "TO_WORD": ("TO", "to"),
     "FOR_WORD": ("FOR", "for"),
-    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration", "TRACKING"),
+    "TOOLKEY": ("VELOCITY", "rotation", "Acceleration", "TRACKING", "CORRECTION", "bound", "RATE"),
     "CIRCULARLY": ("CIRCULARLY", "circularly"),
     "WITHIN": ("WITHIN", "within"),
     "TIMER": ("TIMER", "timer"),

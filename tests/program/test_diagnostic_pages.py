@@ -76,6 +76,8 @@ def test_run_time_pages_run() -> None:
         "E408",
         "E409",
         "E410",
+        "E411",
+        "E412",
         "E504",
         "E505",
         "E506",

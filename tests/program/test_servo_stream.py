@@ -30,6 +30,7 @@ CELLS = {
     "weld": "stanford_cell",
     "sort": "ur5_cell",
     "seam": "ur5_cell",
+    "seam_tracking": "seam_cell",
     "fetch": "stanford_cell",
     "belt": "belt_cell",
     "gearbox": "puma_cell",

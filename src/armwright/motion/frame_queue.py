@@ -30,6 +30,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
+from armwright.motion.averaged_law import SAME_TIME, WINDOW, AveragedLaw, apart, averaged, reached
 from armwright.motion.chain import chain
 from armwright.motion.controlled_stop import until_a_tick
 from armwright.motion.knots import divided, segments_at
@@ -50,8 +51,6 @@ from armwright.motion.trajectory import Trajectory, hold
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
 
-# The time over which the way is averaged [s].
-WINDOW = 0.04
 # The tool is kept as near as this to the legs and corners [m], [rad]; between two knots where it is looked at, half as
 # far at most.
 NEAR, _TURNED = 5e-6, 5e-5
@@ -65,9 +64,8 @@ _RAMP = 0.05
 _USED, _LESS, _TRIES = 0.999, 0.8, 60
 # Speeds at which efforts are looked at, in parts of the largest, and accelerations.
 _SPEEDS, _SIGNS = (0.01, 0.5, 1.0), (-1.0, 1.0)
-# Times and ways nearer than this are the same [s], [m].
-_SAME_TIME, _SAME = 1e-9, 1e-9
-_HALVINGS = 60
+# Ways nearer than this are the same [m].
+_SAME = 1e-9
 # A rate beyond a bound by this part of it is at it.
 _ROUNDING = 1e-9
 
@@ -138,51 +136,6 @@ class _Piece:
         return self.start + self.joints.duration
 
 
-class _Law(NamedTuple):
-    """The way S(t): its acceleration is constant between times (k,), before and after which it rests.
-
-    Attributes:
-        t: [s] of the cell's clock.
-        s: [m].
-        v: [m/s].
-    """
-
-    t: Array
-    s: Array
-    v: Array
-
-    def at(self, t: float) -> tuple[float, float]:
-        """Return S and its rate at a time."""
-        if t >= self.t[-1]:
-            return float(self.s[-1]), 0.0
-        k = max(0, int(np.searchsorted(self.t, t, side="right")) - 1)
-        length, h = float(self.t[k + 1] - self.t[k]), t - float(self.t[k])
-        rate = float(self.v[k + 1] - self.v[k]) / length
-        return float(self.s[k] + h * (self.v[k] + h * rate / 2)), float(self.v[k] + h * rate)
-
-    def until(self, t: float, now: float) -> _Law:
-        """Return it up to a time, from where it is needed on to average it from now on."""
-        if t >= self.t[-1]:
-            times = np.append(self.t, t) if t > self.t[-1] else self.t
-            kept = _Law(times, np.append(self.s, self.s[-1])[: len(times)], np.append(self.v, 0.0)[: len(times)])
-        else:
-            k = int(np.searchsorted(self.t, t, side="left"))
-            s, v = self.at(t)
-            kept = _Law(np.append(self.t[:k], t), np.append(self.s[:k], s), np.append(self.v[:k], v))
-        first = max(0, int(np.searchsorted(kept.t, now - WINDOW, side="right")) - 1)
-        return _Law(kept.t[first:], kept.s[first:], kept.v[first:])
-
-    def then(self, lengths: Array, v: Array) -> _Law:
-        """Return it with intervals (m,) [m] behind it, at whose ends, and start, the rates (m + 1,) are these."""
-        t = self.t[-1] + np.cumsum(2 * lengths / (v[1:] + v[:-1]))
-        s = self.s[-1] + np.cumsum(lengths)
-        return _Law(np.append(self.t, t), np.append(self.s, s), np.append(self.v, v[1:]))
-
-    def rested(self, time: float) -> _Law:
-        """Return it with a rest of a time at its end."""
-        return _Law(np.append(self.t, self.t[-1] + time), np.append(self.s, self.s[-1]), np.append(self.v, 0.0))
-
-
 @attrs.frozen(kw_only=True, eq=False)
 class FrameQueue:
     """A path that grows at its end while an arm runs along it; a value: what puts a frame in returns the next one.
@@ -204,7 +157,7 @@ class FrameQueue:
     pace: Pace
     q_start: Array
     X_last: Array
-    law: _Law
+    law: AveragedLaw
     rates: tuple[Array, Array] | None = None
     most: float = 0.0
     reach: float = 0.0
@@ -224,7 +177,7 @@ class FrameQueue:
         if pace.velocity is None:
             check_reach(solver.arm)
         X = np.asarray(solver.forward(q[None]))[0]
-        return cls(pace=pace, q_start=q, X_last=X, law=_Law(np.array([now]), np.zeros(1), np.zeros(1)))
+        return cls(pace=pace, q_start=q, X_last=X, law=AveragedLaw(np.array([now]), np.zeros(1), np.zeros(1)))
 
     @property
     def end(self) -> float:
@@ -233,11 +186,11 @@ class FrameQueue:
 
     def rests(self, now: float) -> bool:
         """Whether the arm stands at its end."""
-        return now >= self.end - _SAME_TIME
+        return now >= self.end - SAME_TIME
 
     def travelled(self, now: float) -> float:
         """Return how far the arm has come [m]."""
-        return float(self.law.s[-1] if self.rests(now) else _averaged(self.law, now)(0.0)[0])
+        return float(self.law.s[-1] if self.rests(now) else averaged(self.law, now)(0.0)[0])
 
     def passed(self, now: float) -> int:
         """Return how many of its frames the arm has passed."""
@@ -249,7 +202,7 @@ class FrameQueue:
         way = self.marks[number]
         if way >= self.law.s[-1] - _SAME:
             return self.end
-        return now + float(_reached(_averaged(self.law, now), np.array([way]))[0])
+        return now + float(reached(averaged(self.law, now), np.array([way]))[0])
 
     def put(self, arm: AnyArm, X: Array, now: float) -> FrameQueue:
         """Return the queue with one more frame at its end.
@@ -315,11 +268,11 @@ class FrameQueue:
         if self.rests(now):
             last = self.pieces[-1].joints if self.pieces else None
             return hold(self.q_start if last is None else last(last.duration), period)
-        law = _averaged(self.law, now)
+        law = averaged(self.law, now)
         edges = np.concatenate([piece.start + piece.joints.times[:-1] for piece in self.pieces])
         cubics = np.concatenate([piece.joints.coefficients for piece in self.pieces])
         inner = edges[(edges > law(0.0)[0] + _SAME) & (edges < self.law.s[-1] - _SAME)]
-        times = _apart(np.concatenate([law.times, _reached(law, inner)]))
+        times = apart(np.concatenate([law.times, reached(law, inner)]))
         of_law = segments_at(law.times, (times[:-1] + times[1:]) / 2, len(law.coefficients))
         clock = shifted(law.coefficients[of_law], times[:-1] - law.times[of_law])[:, :, 0]
         middles = evaluate(clock[:, :, None], (np.diff(times) / 2)[:, None])[:, 0]
@@ -506,7 +459,7 @@ def _within_efforts(solver: Solver, joints: Trajectory, most: Array, changes: Ar
     raise IncapableArmError(f"arm '{solver.arm.name}': the way to the frame {text}")
 
 
-def _run(pieces: tuple[_Piece, ...], law: _Law, stops: tuple[float, ...]) -> _Law | None:
+def _run(pieces: tuple[_Piece, ...], law: AveragedLaw, stops: tuple[float, ...]) -> AveragedLaw | None:
     """Return a way run on as fast as may be along pieces of a path, to rest at their end.
 
     Args:
@@ -549,47 +502,3 @@ def _least_around(edges: Array, values: Array, most: Array | None = None) -> Arr
     first = np.searchsorted(edges[1:], edges[:-1] - far, side="right")
     last = np.searchsorted(edges[:-1], edges[1:] + far, side="left")
     return np.array([values[i:j].min() for i, j in zip(first.tolist(), last.tolist(), strict=True)])
-
-
-def _averaged(law: _Law, now: float) -> Trajectory:
-    """Return the way averaged over the last moments, from now on, as a motion of one number."""
-    t = np.concatenate([[min(law.t[0], now) - 2 * WINDOW], law.t])
-    origin = float(law.s[0])
-    s, v = np.append(0.0, law.s - origin), np.append(0.0, law.v)
-    lengths = np.diff(t)
-    rates = np.append(np.diff(v) / lengths, 0.0)
-    grown = (s[:-1] + (v[:-1] / 2 + rates[:-1] * lengths / 6) * lengths) * lengths
-    terms = np.stack([np.append(0.0, np.cumsum(grown)), s, v / 2, rates / 6], axis=1)[:, :, None]
-    end = max(float(law.t[-1]) + WINDOW, now)
-    breaks = np.concatenate([law.t, law.t + WINDOW])
-    breaks = _apart(np.concatenate([[now], breaks[(breaks > now) & (breaks < end)], [end]]))
-    middles = (breaks[:-1] + breaks[1:]) / 2
-
-    def around(begin: Array, within: Array) -> Array:
-        on = segments_at(t, within, len(t))
-        return shifted(terms[on], begin - t[on])
-
-    averaged = (around(breaks[:-1], middles) - around(breaks[:-1] - WINDOW, middles - WINDOW)) / WINDOW
-    averaged[:, 0] += origin
-    return Trajectory(times=breaks - now, coefficients=averaged)
-
-
-def _reached(law: Trajectory, ways: Array) -> Array:
-    """Return when a motion of one number that never falls comes to values (k,) between its ends."""
-    begins = law.coefficients[:, 0, 0]
-    on = segments_at(begins, ways, len(begins))
-    low, high = law.times[on], law.times[on + 1]
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        before = law(middle)[:, 0] < ways
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return np.asarray(high)
-
-
-def _apart(times: Array) -> Array:
-    """Return times in order, those left out that follow the one before at no distance; the last one stays."""
-    times = np.sort(times)
-    is_apart = np.append(np.diff(times) > _SAME_TIME, True)
-    kept = times[is_apart]
-    kept[0] = times[0]
-    return np.asarray(kept)

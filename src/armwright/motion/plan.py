@@ -41,7 +41,7 @@ _SAME_CONFIGURATION = 1e-9
 # A joint that moves at this part of its speed limit moves at it; a speed of which this part is reached is reached.
 _AT_LIMIT, _REACHED = 0.98, 0.98
 
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC", "TRACK", "QUEUE"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC", "TRACK", "QUEUE", "SENSED"]
 
 
 @attrs.frozen(kw_only=True)

@@ -128,6 +128,9 @@ class Op(enum.StrEnum):
     MVROT = "MVROT", "N"  # number: largest angular speed of the tool
     MVACC = "MVACC", "N"  # number: largest change of the speed of the tool point
     MVTRK = "MVTRK", "F"  # frame of the cell that moves: its goal goes with that
+    MVCOR = "MVCOR", "jn"  # code of a value, the value: how far beside its line the path is to be
+    MVBND = "MVBND", "N"  # number: how far it may be
+    MVRAT = "MVRAT", "N"  # number: how fast it may move sideways
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
@@ -175,6 +178,7 @@ MOVE_PARTS = frozenset(
     (
         *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
         *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVTRK, Op.MVON),
+        *(Op.MVCOR, Op.MVBND, Op.MVRAT),
     )
 )
 

@@ -16,6 +16,9 @@ from armwright.program.semantics.expression_types import expression_text
 from armwright.program.semantics.move import SPEED_NOTE
 from armwright.program.syntax import tree
 
+# Clauses whose value is a number.
+_VALUED = (tree.Blend, tree.Duration, *tree.TOOL_LIMITS, tree.Correction, tree.Bound, tree.Rate)
+
 
 def move(context: Context, node: tree.Move) -> None:
     """Analyse a MOVE; its actions may run or not while the arm moves."""
@@ -56,7 +59,7 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             check_speed(state, clause.value)
-        elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
+        elif isinstance(clause, _VALUED):
             require_value(state, clause.value)
         elif isinstance(clause, tree.Tracking):
             _check_tracking(state, clause)

@@ -95,6 +95,7 @@ _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
 _CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAUSES))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
+_BESIDE_CORRECTION = frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND", "TRACKING"))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "TRACKING")),
@@ -107,6 +108,8 @@ _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DURATION": frozenset(("SPEED", "VELOCITY")),
     "VELOCITY": frozenset(("SPEED", "DURATION", "TRACKING")),
     **dict.fromkeys(("ROTATION", "ACCELERATION"), frozenset(("TRACKING",))),
+    "CORRECTION": _BESIDE_CORRECTION,
+    **dict.fromkeys(("BOUND", "RATE"), _BESIDE_CORRECTION),
     "TRACKING": frozenset(
         (
             *("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND"),

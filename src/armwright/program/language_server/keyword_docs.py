@@ -109,7 +109,7 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION | TRACKING = value",
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION | ... = value",
         "Specifies approach, departure, speed, rounding of corners, duration, limits of the tool, or a frame to track.",
     ),
     "APPROACH": ("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
@@ -136,6 +136,12 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "WITH TRACKING = frame",
         "The goal goes with a frame of the cell that moves; the arm comes to it, and follows it until its next MOVE.",
     ),
+    "CORRECTION": (
+        "WITH CORRECTION = length, WITH BOUND = length, WITH RATE = length",
+        "How far beside its line the path of a straight MOVE is to be, looked at while the arm moves, as by a sensor.",
+    ),
+    "BOUND": ("WITH BOUND = length", "How far a CORRECTION may move the path at most; more is an error."),
+    "RATE": ("WITH RATE = length", "How far a CORRECTION may move the path in a second."),
     "QUEUE": (
         _QUEUE,
         "Lets an arm run along frames that PUT puts in meanwhile, without a stop, and ends when it stands at the last.",

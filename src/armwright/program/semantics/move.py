@@ -26,6 +26,7 @@ def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
     _check_queue(context, node)
+    _check_correction(names, node)
     require_type(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
     if isinstance(node.goal, tree.Function) and is_joints(names.scope, node.goal):
         _check_joints(names, node, node.goal)
@@ -59,7 +60,7 @@ def _check_queue(context: Context, node: tree.Move) -> None:
         arm = expression_text(node.moved)
         text, here = f"{arm} cannot make a MOVE in its QUEUE", labels(queue.head, "its queue is open from here on")
         advice = f"write `PUT ... TO {arm}`, or the MOVE behind the QUEUE"
-        context.names.report("E257", text, node.span, "it runs along its queue", secondary=here, advice=advice)
+        context.names.report("E256", text, node.span, "it runs along its queue", secondary=here, advice=advice)
 
 
 def check_pose(names: NameResolver, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
@@ -97,6 +98,40 @@ def _check_tracking(names: NameResolver, node: tree.Move, clause: tree.Clause, f
             text = f"TRACKING cannot be combined with {tree.clause_word(type(other))}"
             here, advice = labels(clause.span, "a frame is tracked here"), "write a MOVE of its own for the other leg"
             names.report("E248", text, other.span, "another way, or another speed", secondary=here, advice=advice)
+
+
+# What a path that is corrected on a straight line has nothing to do with.
+_CONFLICTS_WITH_CORRECTION = (
+    *(tree.Directly, tree.Circularly, tree.Via, tree.Approach, tree.Departure, tree.Blend, tree.Tracking),
+)
+
+
+def _check_correction(names: NameResolver, node: tree.Move) -> None:
+    """Check a MOVE whose path a sensor corrects: a line, with a bound and a rate."""
+    given = {type(clause): clause for clause in node.clauses}
+    correction = given.get(tree.Correction)
+    limits = [given[kind] for kind in (tree.Bound, tree.Rate) if kind in given]
+    for clause in limits:
+        if isinstance(clause, tree.Bound | tree.Rate):
+            check_quantity(names, clause, clause.value)
+        if correction is None:
+            text, advice = f"{tree.clause_word(type(clause))} is of a MOVE with CORRECTION", "leave it out"
+            names.report("E257", text, clause.span, "nothing is corrected", advice=advice)
+    if not isinstance(correction, tree.Correction):
+        return
+    require_quantity(names, correction.value, "length", "CORRECTION needs a length")
+    missing = [tree.clause_word(kind) for kind in (tree.Bound, tree.Rate) if kind not in given]
+    if missing:
+        advice = f"write `{', '.join(f'WITH {word} = ...' for word in missing)}` too"
+        names.report("E257", f"CORRECTION needs {' and '.join(missing)}", correction.span, "how far?", advice=advice)
+    if tree.Straightly not in given:
+        text, advice = "CORRECTION needs a straight line", "write STRAIGHTLY"
+        names.report("E257", text, correction.span, "beside which line?", advice=advice)
+    for other in node.clauses:
+        if isinstance(other, _CONFLICTS_WITH_CORRECTION):
+            text = f"CORRECTION cannot be combined with {tree.clause_word(type(other))}"
+            here, advice = labels(correction.span, "corrected here"), "write a MOVE of its own for the other leg"
+            names.report("E257", text, other.span, "another way", secondary=here, advice=advice)
 
 
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.
@@ -152,6 +187,8 @@ _QUANTITIES: dict[type, tuple[Dimension, str]] = {
     tree.Velocity: ("length", "a length per second"),
     tree.Rotation: ("angle", "an angle per second"),
     tree.Acceleration: ("length", "a length per second squared"),
+    tree.Bound: ("length", "a length"),
+    tree.Rate: ("length", "a length per second"),
 }
 
 

@@ -32,10 +32,10 @@ def queue(context: Context, node: tree.Queue) -> None:
     arm = node.arm.key if isinstance(node.arm, tree.ArmName) else ""
     if context.interrupting and context.procedure is None:
         text, advice = "an action cannot open a queue", "write QUEUE around the statements that the action interrupts"
-        names.report("E257", text, node.head, "in the action of a WHEN", advice=advice)
+        names.report("E256", text, node.head, "in the action of a WHEN", advice=advice)
     elif arm in context.queues:
         text, here = f"the queue of {arm} is open already", labels(context.queues[arm].head, "opened here")
-        names.report("E257", text, node.head, "opened a second time", secondary=here)
+        names.report("E256", text, node.head, "opened a second time", secondary=here)
     outside = context.queues
     context.queues = {**outside, arm: node} if arm else outside
     context.check(node.body)
@@ -62,7 +62,7 @@ def put(context: Context, node: tree.Put) -> None:
             f"{node.arm.key} has no open queue here",
             f"write `QUEUE {node.arm.key} DO BEGIN ... END` around it",
         )
-        names.report("E257", text, node.head, "into which queue?", advice=advice)
+        names.report("E256", text, node.head, "into which queue?", advice=advice)
     if node.otherwise is not None:
         context.check(node.otherwise)
 

@@ -20,8 +20,11 @@ _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Pri
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
 VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     tree.clause_word(kind): kind
-    for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS)
-} | {"TRACKING": tree.Tracking, "CAPACITY": tree.Capacity}
+    for kind in (
+        *(tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS),
+        *(tree.Correction, tree.Bound, tree.Rate, tree.Capacity),
+    )
+} | {"TRACKING": tree.Tracking}
 _CLAUSES_IN_CONTEXT = (*PLAIN_CLAUSES_IN_CONTEXT, *WITH_CLAUSES_IN_CONTEXT)
 
 
@@ -91,6 +94,7 @@ def _starts_clause(tokens: TokenStream) -> bool:
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
 #        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" | "TRACKING" ) "=" expr
+#        | "WITH" ( "CORRECTION" | "BOUND" | "RATE" ) "=" expr
 #        | "ON" expr "DO" action ;
 def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""

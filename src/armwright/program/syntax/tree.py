@@ -212,6 +212,27 @@ class Tracking(Node):
 
 
 @attrs.frozen
+class Correction(Node):
+    """``WITH CORRECTION = length``: how far beside its line the path is to be, looked at while the arm moves."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Bound(Node):
+    """``WITH BOUND = length``: how far beside its line a path may be at most."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Rate(Node):
+    """``WITH RATE = length per second``: how fast a path may move sideways."""
+
+    value: Expression
+
+
+@attrs.frozen
 class Capacity(Node):
     """``WITH CAPACITY = number``: how many frames a queue holds."""
 
@@ -241,6 +262,9 @@ Clause: TypeAlias = (
     | Rotation
     | Acceleration
     | Tracking
+    | Correction
+    | Bound
+    | Rate
     | Capacity
     | On
 )

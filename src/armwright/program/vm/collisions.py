@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -85,9 +86,15 @@ def checked_stages(
 
 
 def refuse_collision(
-    machine: Machine, process: Process, arm: str, trajectory: Trajectory, goal_at: tuple[str, Span]
+    machine: Machine,
+    process: Process,
+    arm: str,
+    trajectory: Trajectory,
+    goal_at: tuple[str, Span],
+    *,
+    ahead: float = math.inf,
 ) -> None:
-    """Look whether an arm that runs on along its queue would run into something.
+    """Look whether an arm that runs on along another path would run into something, as far ahead as is told [s].
 
     Raises:
         RunError: it would.
@@ -96,7 +103,13 @@ def refuse_collision(
         return
     hand = machine.state.hands[arm]
     goal_part = _goal_part(machine, arm, trajectory)
-    move = PlannedMove(arm=arm, stages=(trajectory,), goal_part=goal_part, after_force=hand.pressed, on_force=False)
+    move = PlannedMove(
+        arm=arm,
+        stages=(trajectory.until(min(ahead, trajectory.duration)),),
+        goal_part=goal_part,
+        after_force=hand.pressed,
+        on_force=False,
+    )
     collision = _check(machine, move, clearances=False).collision
     if collision is not None:
         raise _error(machine, process, collision, arm, goal_at)

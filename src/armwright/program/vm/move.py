@@ -41,6 +41,7 @@ from armwright.program.vm.contact import (
     stop_arm,
     update_depth_alarm,
 )
+from armwright.program.vm.corrections import begin_correction, correct, finish_correction, side_of, with_room
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
@@ -135,6 +136,12 @@ def _begin_move(
         planned: list[tuple[PlannedStage, tuple[str, ...]]] = [(stage, (request.form.goal,))]
     else:
         planned = _plan_stages(machine, process, request, arm, moved)
+    correction = request.correction
+    if correction is not None:
+        ((stage, names),) = planned
+        side = side_of(machine, process, arm, stage, request.span)
+        correction = attrs.evolve(correction, side=side)
+        planned = [(with_room(machine, stage, request.duration), names)]
     stages = checked_stages(machine, process, request, arm, planned)
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
@@ -156,6 +163,7 @@ def _begin_move(
         start=machine.next_start(),
         guards=request.guards,
         tracking=tracking,
+        correction=correction,
     )
     start_stage(machine, process, process.motion)
 
@@ -172,9 +180,13 @@ def advance_motion(machine: Machine, process: Process) -> None:
             process.stack.append(process.activation.create_nested("action", **fields))
             process.pc = guard.action
             return
+    due = motion.stage_end_tick
+    if motion.correction is not None:
+        correct(machine, process, motion)
+        due = min(motion.stage_end_tick, motion.correction.tick)
     if machine.state.ticks < motion.stage_end_tick:
         is_guarded = not all(guard.triggered for guard in motion.guards)
-        process.wake_tick = machine.state.ticks + 1 if is_guarded else motion.stage_end_tick
+        process.wake_tick = machine.state.ticks + 1 if is_guarded else due
     elif motion.stages:
         start_stage(machine, process, motion)
     else:
@@ -311,7 +323,12 @@ def _plan_stages(
         for legs in plans
     ]
     manner = Manner(
-        speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
+        speed=request.speed,
+        deviation=cell.deviation,
+        period=cell.period,
+        # A correction is one of a straight line, and not of a detour.
+        around=cell.around if request.correction is None else None,
+        tool=request.tool,
     )
     try:
         stages = plan(planner_of(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
@@ -487,6 +504,9 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     if any(guard.reads_pose for guard in motion.guards):
         motion.hand_poses = machine.base_pose(motion.arm) @ forward(arm, trajectory(np.arange(counted + 1) * period))
     process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
+    if motion.correction is not None:
+        begin_correction(machine, motion)
+        process.wake_tick = machine.state.ticks
 
 
 def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
@@ -513,6 +533,8 @@ def finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     if held and held != hand.reached_frame and arm not in machine.state.tree.ancestors(held):
         hand.held_frame = None
     record_contact(machine, motion)
+    if motion.correction is not None and motion.early_end is None:
+        finish_correction(machine, motion)
     contact_text, contact = contact_report(motion)
     text, since, data = motion.trace_text + contact_text, motion.start, {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", text, motion.span, since=since, arm=arm, data=data)

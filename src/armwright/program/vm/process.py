@@ -16,6 +16,7 @@ from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
 
 if TYPE_CHECKING:
+    from armwright.motion.corrected_line import CorrectedLine
     from armwright.motion.frame_queue import FrameQueue, Pace
     from armwright.physics.collisions import Collision, StageClearance
     from armwright.physics.planner import PlannedPath
@@ -303,6 +304,7 @@ class Motion:
         early_end: what ended it before its goal; None where nothing did.
         course: of its present stage, where that was resumed; None where it was not.
         stopped: where its present stage was stopped, which may be its end; None where that runs.
+        correction: by a sensor, of its path; None where there is none.
         tracking: of a frame that moves, which the arm follows when the MOVE is over; None where it does not.
     """
 
@@ -332,6 +334,7 @@ class Motion:
     course: Course | None = None
     stopped: StoppedOn | None = None
     tracking: Tracking | None = None
+    correction: Correction | None = None
 
     @property
     def trace_text(self) -> str:
@@ -347,6 +350,8 @@ class Motion:
             "speed": self.speed,
             "implied_affix": self.implied_affix,
         }
+        if self.correction is not None:
+            data["largest_correction"] = self.correction.largest
         if self.paths:
             data["planned_paths"] = [path.as_data() for path in self.paths]
         return data if self.early_end is None else {**data, self.early_end.value: True}
@@ -371,6 +376,31 @@ class MovesAhead:
     poses: tuple[Array, ...] = ()
     joints: tuple[Array | None, ...] = ()
     implied_affix: bool = False
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Correction:
+    """How a sensor corrects the path of a MOVE.
+
+    Attributes:
+        code: first instruction of what says how far beside its line the path is to be.
+        result: the value in passing that it leaves.
+        bound: how far it may be [m].
+        rate: how fast the path may move sideways [m/s].
+        side: (3,) where it moves, of length 1, in the base of the arm; zeros before the line is known.
+        line: that is corrected; None before it begins.
+        tick: when it is looked at next [ticks].
+        largest: the largest offset that was asked for [m].
+    """
+
+    code: int
+    result: str
+    bound: float
+    rate: float
+    side: Array = attrs.field(factory=lambda: np.zeros(3))
+    line: CorrectedLine | None = None
+    tick: int = 0
+    largest: float = 0.0
 
 
 @attrs.frozen(kw_only=True, eq=False)

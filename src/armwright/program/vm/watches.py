@@ -214,6 +214,9 @@ def _resume(machine: Machine, process: Process, step: Instruction) -> None:
     if motion.tracking is not None:
         text, help_ = "a MOVE that tracks a frame cannot be resumed", "leave RESUME out, and track it with another MOVE"
         raise machine.error(process, "E409", text, step.span, "the frame has gone on", helps=[help_])
+    if motion.correction is not None:
+        text, help_ = "a MOVE whose path is corrected cannot be resumed", "leave RESUME out, and write another MOVE"
+        raise machine.error(process, "E412", text, step.span, "the line has been left", helps=[help_])
     interruption.motion, interruption.braked, process.motion = None, False, motion
     motion.stages[:0] = _stages_to_go_on(machine, motion)
     motion.rest_tick = motion.stopped = None
