@@ -29,6 +29,8 @@ CELLS = {
     "palletise": "stanford_cell",
     "weld": "stanford_cell",
     "sort": "ur5_cell",
+    "seam": "ur5_cell",
+    "seam_tracking": "seam_cell",
     "fetch": "stanford_cell",
     "belt": "belt_cell",
     "gearbox": "puma_cell",

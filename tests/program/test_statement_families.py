@@ -11,7 +11,7 @@ import armwright.program
 from armwright.program.bytecode.instructions import Op
 from armwright.program.syntax import tree
 
-FAMILIES = ("frames", "devices", "move", "control_flow", "output")
+FAMILIES = ("frames", "devices", "move", "queues", "control_flow", "output")
 # Each stage with the name of the table in each of its families; the parser has one function for each rule.
 TABLES = {"semantics": "CHECKS", "flow_analysis": "STEPS", "bytecode": "GENERATORS", "vm": "HANDLERS"}
 STAGES = ("syntax", *TABLES)
@@ -20,6 +20,7 @@ NODES = {
     "frames": set(get_args(tree.FrameStatement)),
     "devices": set(get_args(tree.DeviceStatement)),
     "move": {tree.Move},
+    "queues": set(get_args(tree.QueueStatement)),
     "control_flow": set(get_args(tree.ControlStatement)),
     "output": set(get_args(tree.OutputStatement)),
 }
@@ -27,6 +28,7 @@ OPERATIONS = {
     "frames": {"AFFIX", "AFFAT", "UNFIX"},
     "devices": {"OPEN", "GRASP", "OPER", "OPSET", "PULSE", "TIMSW", "TIMSET", "READV", "READS", "ZEROF"},
     "move": {op.value for op in Op if op.value.startswith("MV")},
+    "queues": {"QUEUE", "PUT", "QUEND"},
     "output": {"PRINT", "LOG"},
 }
 

@@ -161,6 +161,14 @@ def refuse_tracking(recording: Recording) -> None:
         ExportError: it has one.
     """
     for stage in recording.stages:
+        if stage.stage.kind == "SENSED":
+            text = "the path is corrected by a sensor, and a planned motion is always the same"
+            helps = ["export the parts of the program before and behind it"]
+            raise refusal(recording.code.source, "E611", text, stage.span, "a sensor corrects this path", helps=helps)
+        if stage.stage.kind == "QUEUE":
+            text = "frames are put into the queue of an arm while it moves, and a planned motion is known before"
+            helps = ["write `MOVE ... VIA (...)` with the frames"]
+            raise refusal(recording.code.source, "E611", text, stage.span, "a queue is run along here", helps=helps)
         if stage.stage.kind == "TRACK":
             text = "a frame that moves is tracked by the controller itself, and a planned motion is always the same"
             helps = ["export the parts of the program before and behind it"]

@@ -22,7 +22,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, number, one_per_joint
 from armwright.errors import InvalidValueError
-from armwright.motion.polynomials import derivative, evaluate, shifted
+from armwright.motion.polynomials import composition, derivative, evaluate, shifted
 from armwright.motion.trajectory import Trajectory, hold
 
 # How long the clock takes to go from no deceleration to the largest, so that the acceleration does not jump [s].
@@ -100,8 +100,8 @@ def stop_on_path(running: Trajectory, t: float, acceleration: ArrayLike, *, peri
         cells = _Clock(running, limit, t, period).cells(0.5**halving)
         stop = _run_by(running, cells)
         if (_peaks(stop) <= allowed).all():
-            return Stop(_until_a_tick(stop, period), min(cells[-1].at(cells[-1].length)[0], running.duration))
-    return Stop(_until_a_tick(_run_by(running, _to_its_end(running, t)), period), running.duration)
+            return Stop(until_a_tick(stop, period), min(cells[-1].at(cells[-1].length)[0], running.duration))
+    return Stop(until_a_tick(_run_by(running, _to_its_end(running, t)), period), running.duration)
 
 
 def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Resumption:
@@ -132,7 +132,7 @@ def resume(running: Trajectory, t: float, acceleration: ArrayLike, *, period: fl
         length *= _LONGER
     terms = np.array([[cell.tau, cell.rate, cell.slowing / 2, cell.fading / 6] for cell in cells])
     clock = Trajectory(times=start.times, coefficients=terms[:, :, None])
-    return Resumption(_until_a_tick(start, period), _until_a_tick(clock, period))
+    return Resumption(until_a_tick(start, period), until_a_tick(clock, period))
 
 
 def _limits(running: Trajectory, t: float, acceleration: ArrayLike) -> tuple[Array, Array]:
@@ -288,16 +288,8 @@ def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:
     starts = np.array([cell.tau for cell in cells]) - running.times[segments]
     path = shifted(running.coefficients[segments], starts)
     clock = np.array([[cell.rate, cell.slowing / 2, cell.fading / 6] for cell in cells])
-    count, joints = path.shape[1:]
-    terms = np.zeros((len(cells), 3 * (count - 1) + 1, joints))
-    for power in reversed(range(count)):
-        longer = np.zeros_like(terms)
-        for order in range(3):
-            longer[:, order + 1 :] += terms[:, : -order - 1] * clock[:, None, None, order]
-        terms = longer
-        terms[:, 0] += path[:, power]
     times = np.concatenate([[0.0], np.cumsum([cell.length for cell in cells])])
-    return Trajectory(times=times, coefficients=terms)
+    return Trajectory(times=times, coefficients=composition(path, clock))
 
 
 def _peaks(motion: Trajectory) -> Array:
@@ -308,7 +300,7 @@ def _peaks(motion: Trajectory) -> Array:
     return np.asarray(np.abs(evaluate(derivative(states, 2), fractions)).max(axis=0))
 
 
-def _until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
+def until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
     """Return a stop with rest behind it until the next tick of the servo."""
     if period is None:
         return stop

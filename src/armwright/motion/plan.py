@@ -41,7 +41,7 @@ _SAME_CONFIGURATION = 1e-9
 # A joint that moves at this part of its speed limit moves at it; a speed of which this part is reached is reached.
 _AT_LIMIT, _REACHED = 0.98, 0.98
 
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC", "TRACK"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "ARC", "TRACK", "QUEUE", "SENSED"]
 
 
 @attrs.frozen(kw_only=True)
@@ -270,7 +270,7 @@ def _candidates(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: 
     try:
         yield _along(arm, path, q, goal, manner)
     except PathError as error:
-        obstacle = _obstacle_on_path(arm, path, error)
+        obstacle = obstacle_on_path(arm, path, error)
         bypass = _bypass(arm, q, goal, manner, obstacle)
         if bypass is None:
             raise StageError(number, obstacle) from error
@@ -364,11 +364,11 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
         certificate=motion.certificate,
         deviation=motion.certificate.deviation,
         slowed=stops or motion.certificate.slowed,
-        obstacle=None if stopped_by is None else _obstacle_on_path(arm, path, stopped_by),
+        obstacle=None if stopped_by is None else obstacle_on_path(arm, path, stopped_by),
     )
 
 
-def _obstacle_on_path(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
+def obstacle_on_path(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
     """Return what stops the arm on a path, with its position."""
     ends = path.poses[error.segment : error.segment + 2]
     return Obstacle(

@@ -49,6 +49,28 @@ def derivative(terms: Array, order: int) -> Array:
     return terms
 
 
+def composition(outer: Array, clock: Array) -> Array:
+    """Return polynomials with others put in for their variable.
+
+    Args:
+        outer: (m, k, n) coefficients.
+        clock: (m, c) those of the powers 1 to c of what is put in, which is 0 at 0.
+
+    Returns:
+        (m, c (k - 1) + 1, n).
+    """
+    count, joints = outer.shape[1:]
+    powers = clock.shape[1]
+    terms = np.zeros((len(outer), powers * (count - 1) + 1, joints))
+    for power in reversed(range(count)):
+        longer = np.zeros_like(terms)
+        for order in range(powers):
+            longer[:, order + 1 :] += terms[:, : -order - 1] * clock[:, None, None, order]
+        terms = longer
+        terms[:, 0] += outer[:, power]
+    return terms
+
+
 def slope(terms: list[Scalar]) -> list[Scalar]:
     """Return the coefficients of the derivative of one polynomial; that of 0 where nothing is left."""
     return [power * term for power, term in enumerate(terms)][1:] or [0.0 * terms[0]]

@@ -137,7 +137,7 @@ class StageRow:
     t1: float
     line: int
     arm: str
-    kind: Literal["PTP", "LINE", "ARC", "SPLINE", "BLEND", "TRACK", "JOINT", "HAND"]
+    kind: Literal["PTP", "LINE", "ARC", "SPLINE", "BLEND", "TRACK", "QUEUE", "SENSED", "JOINT", "HAND"]
     to: Sequence[str]
     speed: float
     peak_speed: Sequence[float]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from armwright.program.bytecode import control_flow, devices, frames, move, output
+from armwright.program.bytecode import control_flow, devices, frames, move, output, queues
 from armwright.program.bytecode.context import Context, Generators
 from armwright.program.bytecode.emitter import Emitter
 from armwright.program.bytecode.instructions import Code, Op, ProcedureCode
@@ -12,7 +12,7 @@ from armwright.program.language.source import Source
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-_FAMILIES = (frames, devices, move, control_flow, output)
+_FAMILIES = (frames, devices, move, queues, control_flow, output)
 GENERATORS: Generators = {node: generate for family in _FAMILIES for node, generate in family.GENERATORS.items()}
 
 

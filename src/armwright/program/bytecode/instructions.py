@@ -92,6 +92,9 @@ class Op(enum.StrEnum):
     OUTPUT = "OUTPUT", "T=w"  # to, device: whether it is on
     SETTING = "SETTING", "N=w"  # to, device: what it is set to
     TIMER = "TIMER", "N=w"  # to, timer: its seconds
+    QUEUED = "QUEUED", "N=w"  # to, arm: how many frames of its queue are ahead of it
+    CAPACITY = "CAPACITY", "N=w"  # to, arm: how many there may be
+    AWAITED = "AWAITED", "P=wN"  # to, arm, number: one of them, 1 for the next
     ELEM = "ELEM", "nwN+"  # to, array, indices: the element itself, to be read and written
     # frames
     AFFIX = "AFFIX", "FF(r)"  # child, parent[, RIGIDLY]: hang on, where both stand now
@@ -125,9 +128,15 @@ class Op(enum.StrEnum):
     MVROT = "MVROT", "N"  # number: largest angular speed of the tool
     MVACC = "MVACC", "N"  # number: largest change of the speed of the tool point
     MVTRK = "MVTRK", "F"  # frame of the cell that moves: its goal goes with that
+    MVCOR = "MVCOR", "jn"  # code of a value, the value: how far beside its line the path is to be
+    MVBND = "MVBND", "N"  # number: how far it may be
+    MVRAT = "MVRAT", "N"  # number: how fast it may move sideways
     MVON = "MVON", "jnj"  # condition, truth value, action: look at every tick, act once
     MVEND = "MVEND", ""  # go
     MVHLT = "MVHLT", ""  # in an action: end the motion
+    QUEUE = "QUEUE", "wNNNN"  # arm, capacity, speed, velocity, blend, -1 for none: its queue is opened
+    PUT = "PUT", "wP(j)"  # arm, frame[, place when the queue is full]: one frame more
+    QUEND = "QUEND", "w"  # arm: stop at the last frame, and close the queue
     # control
     JMP = "JMP", "j"  # place
     JZ = "JZ", "Tj"  # truth value, place: go there when it is false
@@ -169,8 +178,13 @@ MOVE_PARTS = frozenset(
     (
         *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
         *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVTRK, Op.MVON),
+        *(Op.MVCOR, Op.MVBND, Op.MVRAT),
     )
 )
+
+
+# What stands for a clause of QUEUE that is left out.
+LEFT_OUT = -1.0
 
 
 @attrs.frozen

@@ -24,6 +24,8 @@ _CLAUSES: dict[type, Op] = {
     tree.Rotation: Op.MVROT,
     tree.Acceleration: Op.MVACC,
     tree.Tracking: Op.MVTRK,
+    tree.Bound: Op.MVBND,
+    tree.Rate: Op.MVRAT,
 }
 
 
@@ -48,15 +50,24 @@ def move(context: Context, node: tree.Move) -> None:
     for op, span, operands in parts:
         out.emit(op, *operands, span=span)
     conditions = [(guard, out.emit(Op.MVON, LATER, out.passing(), LATER, span=guard.head)) for guard in guards]
+    corrections = [
+        (clause, out.emit(Op.MVCOR, LATER, out.passing(), span=clause.span))
+        for clause in node.clauses
+        if isinstance(clause, tree.Correction)
+    ]
     comment = stages_text(form)
     arm = context.flow.arms.get(node.span.start)
     if arm and moved != arm:
         comment += f", r = {arm} -> {context.text(node.moved)}"
     out.emit(Op.MVEND, span=node.span, comment=comment)
-    if guards:
+    if guards or corrections:
         over = out.emit(Op.JMP, LATER, span=node.span)
         for guard, number in conditions:
             _guard(context, guard, number)
+        for clause, number in corrections:
+            out.patch_jump(number)
+            out.value(clause.value, str(out.instructions[number].operands[1]))
+            out.emit(Op.RET, span=clause.span)
         out.patch_jump(over)
 
 

@@ -95,6 +95,8 @@ _OF_FUNCTIONS = _OF_CONDITIONS - {Op.RET} | {Op.JMP, Op.FOR, Op.RAISE, Op.RETV, 
 # The parts of a MOVE of which an arc has only two.
 _TOOL_LIMITS = {Op.MVVEL, Op.MVROT, Op.MVACC}
 _WAYS = {Op.MVSTR, Op.MVCIR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVBLD, Op.MVJNT, Op.MVTGT}
+# What a path that a sensor corrects needs.
+_CORRECTED = {Op.MVSTR, Op.MVBND, Op.MVRAT}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION, Routine.WATCH),
@@ -183,6 +185,8 @@ def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
             yield CodeError(number, "expected MVCIR with one frame in MVVIA, and without MVSTR, MVDEP, MVAPP and MVBLD")
         if op is Op.MVTRK and _parts_of(code, number) & (_WAYS - {Op.MVSTR} | _TOOL_LIMITS):
             yield CodeError(number, "expected MVTRK without another way to go and without limits of the tool")
+        if op is Op.MVCOR and not _is_corrected(_parts_of(code, number)):
+            yield CodeError(number, "expected MVCOR with MVSTR, MVBND and MVRAT, and without another way to go")
         if number in targets and before in MOVE_PARTS | {Op.MVBEG, Op.FORK}:
             yield CodeError(number, "a jump must not lead into the middle of a MOVE or of FORKs")
         before = op
@@ -197,6 +201,11 @@ def _is_arc(code: Code, number: int) -> bool:
         last += 1
     parts = [step for step in code.instructions[first : last + 1] if step.op in _WAYS]
     return [(step.op, len(step.operands)) for step in parts] == [(Op.MVCIR, 0), (Op.MVVIA, 1)]
+
+
+def _is_corrected(parts: set[Op]) -> bool:
+    """Whether a path that a sensor corrects has what it needs, and nothing else says which way it goes."""
+    return parts >= _CORRECTED and not parts & (_WAYS - {Op.MVSTR} | {Op.MVTRK})
 
 
 def _parts_of(code: Code, number: int) -> set[Op]:
@@ -282,6 +291,14 @@ def _element(verifier: Verifier, state: State) -> Flow:
     if not str(to).startswith("%"):
         raise verifier.wrong(f"ELEM expects a temporary such as %1 for its result, got {to}")
     return Flow(verifier.define(state, str(to), Element(kind.kind)))
+
+
+def _correction(verifier: Verifier, state: State) -> Flow:
+    (code,), value = verifier.targets, verifier.operands[1]
+    if not str(value).startswith("%"):
+        raise verifier.wrong(f"MVCOR expects a temporary such as %1 for its value, got {value}")
+    verifier.begin(code, Routine.CONDITION, state, str(value))
+    return Flow(state)
 
 
 def _guard(verifier: Verifier, state: State) -> Flow:
@@ -420,10 +437,12 @@ _RULES: Mapping[Op, Rule] = {
     **dict.fromkeys((Op.EQ, Op.NE), _compare),
     Op.ELEM: _element,
     Op.MVON: _guard,
+    Op.MVCOR: _correction,
     Op.WHEN: _guard,
     Op.DISARM: _disarm,
     Op.UNTIL: _until,
     Op.AWAIT: lambda verifier, state: Flow(state, (verifier.targets[0], state)),
+    Op.PUT: lambda verifier, state: Flow(state, next(((target, state) for target in verifier.targets), None)),
     Op.LOG: _log,
     Op.LOCK: _lock,
     Op.UNLK: _unlock,

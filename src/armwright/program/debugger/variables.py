@@ -11,7 +11,7 @@ from armwright.cell.frames import WORLD
 from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine
-from armwright.program.vm.process import Process, Value
+from armwright.program.vm.process import Process, RingQueue, Value
 from armwright.program.vm.value_text import frames_with_depth, matrix_text, noap_texts
 
 _NO_VALUE = "no value yet"
@@ -214,16 +214,26 @@ def _arm_variable(machine: Machine, name: str) -> Variable:
         holds = machine.state.hands[name].held_frame
         wrench = machine.hardware.contact_wrench(name, machine.now).tolist()
         hand = value_variable(machine, "hand", machine.gripper_pose(name), "FRAME")
+        queue = machine.state.queues.get(name)
+        queues = [] if queue is None else [Variable(name="queue", value=_queue_text(machine, queue))]
         return [
             *joints,
             attrs.evolve(hand, expression=name, slot=name),
             Variable(name="moves", value=_motion_text(machine, name)),
+            *queues,
             Variable(name="holds", value=machine.spelling(holds) if holds else "nothing"),
             Variable(name="force", value=f"({', '.join(f'{component:.6g}' for component in wrench[:3])}) N"),
             Variable(name="torque", value=f"({', '.join(f'{component:.6g}' for component in wrench[3:])}) N m"),
         ]
 
     return Variable(name=name, value=", ".join(texts), type=arm.name, children=children)
+
+
+def _queue_text(machine: Machine, queue: RingQueue) -> str:
+    """Return how many frames of a queue are ahead of its arm, and which."""
+    ahead = queue.ahead(machine.now)
+    frames = ", ".join(queue.labels[len(queue.labels) - ahead :])
+    return f"{ahead} of {queue.capacity}{': ' if frames else ''}{frames}"
 
 
 def _motion_text(machine: Machine, arm: str) -> str:

@@ -8,7 +8,17 @@ from collections.abc import Mapping
 
 import attrs
 
-from armwright.program.flow_analysis import calls, concurrency, control_flow, data_races, devices, frames, move, output
+from armwright.program.flow_analysis import (
+    calls,
+    concurrency,
+    control_flow,
+    data_races,
+    devices,
+    frames,
+    move,
+    output,
+    queues,
+)
 from armwright.program.flow_analysis.context import Context, Steps
 from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Diagnostic
@@ -17,7 +27,7 @@ from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-STEPS: Steps = {**frames.STEPS, **devices.STEPS, **move.STEPS, **control_flow.STEPS, **output.STEPS}
+STEPS: Steps = {**frames.STEPS, **devices.STEPS, **move.STEPS, **queues.STEPS, **control_flow.STEPS, **output.STEPS}
 
 
 @attrs.frozen(kw_only=True)

@@ -161,7 +161,7 @@ def _unconditional_steps(statements: Sequence[tree.Statement], scope: Scope) -> 
         if isinstance(node, tree.Signal) or (isinstance(node, tree.Wait) and node.limit is None):
             if (name := written_name(node.event, scope)) is not None:
                 yield _EventStep(node, name)
-        elif isinstance(node, tree.Block | tree.Lock):
+        elif isinstance(node, tree.Block | tree.Lock | tree.Queue):
             yield from _unconditional_steps(child_statements(node), scope)
         elif isinstance(node, tree.Halt | tree.Raise):
             return

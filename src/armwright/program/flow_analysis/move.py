@@ -16,6 +16,9 @@ from armwright.program.semantics.expression_types import expression_text
 from armwright.program.semantics.move import SPEED_NOTE
 from armwright.program.syntax import tree
 
+# Clauses whose value is a number.
+_VALUED = (tree.Blend, tree.Duration, *tree.TOOL_LIMITS, tree.Correction, tree.Bound, tree.Rate)
+
 
 def move(context: Context, node: tree.Move) -> None:
     """Analyse a MOVE; its actions may run or not while the arm moves."""
@@ -55,8 +58,8 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
     plausibility.check_lengths(state, *targets)
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
-            _check_speed(state, clause.value)
-        elif isinstance(clause, tree.Blend | tree.Duration | tree.Velocity | tree.Rotation | tree.Acceleration):
+            check_speed(state, clause.value)
+        elif isinstance(clause, _VALUED):
             require_value(state, clause.value)
         elif isinstance(clause, tree.Tracking):
             _check_tracking(state, clause)
@@ -212,7 +215,8 @@ def _check_tracking(state: FlowState, clause: tree.Tracking) -> None:
     state.report("E249", text, clause.point.span, "nothing to track", note=note, advice=advice)
 
 
-def _check_speed(state: FlowState, node: tree.Expression) -> None:
+def check_speed(state: FlowState, node: tree.Expression) -> None:
+    """Check that a SPEED has a value, one in the range of speeds where it is known."""
     require_value(state, node)
     known = state.number(node)
     if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):

@@ -23,6 +23,7 @@ _LARGE = (
     tree.Try,
     tree.Lock,
     tree.Move,
+    tree.Queue,
     tree.WaitUntil,
 )
 _NOTHING_BEFORE = frozenset((",", ")", "]", "."))
@@ -167,11 +168,13 @@ class _Layout:
         match node:
             case tree.Move():
                 self._move(node, column)
-            case tree.Wait() | tree.WaitUntil():
+            case tree.Wait() | tree.WaitUntil() | tree.Put():
                 self._wait(node, column)
             case tree.If():
                 self._if(node, column)
-            case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body) | tree.When(action=body):
+            case tree.While(body=body) | tree.For(body=body) | tree.Lock(body=body) | tree.Queue(body=body):
+                self._nested(body, column)
+            case tree.When(action=body):
                 self._nested(body, column)
             case tree.Block():
                 self._block(node, column)
@@ -198,7 +201,7 @@ class _Layout:
         """Lay out the statement behind THEN, ELSE or DO."""
         self._statement(node, column if isinstance(node, tree.Block) else column + INDENT)
 
-    def _wait(self, node: tree.Wait | tree.WaitUntil, column: int) -> None:
+    def _wait(self, node: tree.Wait | tree.WaitUntil | tree.Put, column: int) -> None:
         if node.otherwise is not None:
             self._row(self._before(node.otherwise.span.start).start, column, comment_indent=INDENT)
             self._nested(node.otherwise, column)

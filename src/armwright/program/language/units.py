@@ -29,6 +29,8 @@ MAX_NUMBER = 1e100
 # Speeds of a MOVE, in per cent of the normal one.
 NORMAL_SPEED = 100.0
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0
+# Frames that the queue of an arm may hold.
+MOST_FRAMES = 1000
 
 
 @attrs.frozen(kw_only=True)

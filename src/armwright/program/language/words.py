@@ -69,9 +69,13 @@ HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE", "RECORD")
 PARAMETER_MODES = ("IN", "INOUT")
 # Clauses of MOVE that are words only where a clause may begin.
 PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
-WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION", "TRACKING")
+WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION", "TRACKING", "CORRECTION", "BOUND", "RATE")
+# A clause of QUEUE alone.
+QUEUE_CLAUSES_IN_CONTEXT = ("CAPACITY",)
 # What starts a statement only in front of a name.
 STATEMENTS_BEFORE_NAME = ("PULSE", "RAISE", "TIMER")
+# What starts a statement only in front of an arm, and of an arm or a name.
+STATEMENTS_BEFORE_ARM, STATEMENTS_BEFORE_FRAME = ("QUEUE",), ("PUT",)
 # What starts a statement only in front of a text.
 STATEMENTS_BEFORE_TEXT = ("LOG",)
 # What is a statement by itself, where neither `=` nor a bracket follows.
@@ -83,7 +87,10 @@ WORDS_IN_CONTEXT = frozenset(
         *PARAMETER_MODES,
         *PLAIN_CLAUSES_IN_CONTEXT,
         *WITH_CLAUSES_IN_CONTEXT,
+        *QUEUE_CLAUSES_IN_CONTEXT,
         *STATEMENTS_BEFORE_NAME,
+        *STATEMENTS_BEFORE_ARM,
+        *STATEMENTS_BEFORE_FRAME,
         *STATEMENTS_BEFORE_TEXT,
         "AS",
         *STATEMENTS_ALONE,
@@ -114,6 +121,8 @@ UNSUPPORTED_STATEMENTS = {
     "RAISE": "write `RAISE kind`, with a name for errors of this kind",
     "TIMER": "write `TIMER name ON`",
     "PULSE": "write `PULSE device FOR seconds`",
+    "PUT": "write `PUT f TO ARM_1`",
+    "QUEUE": "write `QUEUE ARM_1 DO BEGIN ... END`",
     "LOG": 'write `LOG "name" (values)`',
     "CALL": "a procedure is called by its name: `name(...)`",
     "RETURN": "a procedure returns at its END; a FUNCTION returns a value by `RETURN value`",

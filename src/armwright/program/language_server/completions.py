@@ -14,9 +14,12 @@ from armwright.program.language.source import Source
 from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import (
     BLOCK_CLOSERS,
+    QUEUE_CLAUSES_IN_CONTEXT,
     SENSORS,
     STATEMENT_PHRASES,
     STATEMENTS_ALONE,
+    STATEMENTS_BEFORE_ARM,
+    STATEMENTS_BEFORE_FRAME,
     STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     VALUES,
@@ -31,7 +34,7 @@ from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_
 from armwright.program.language_server.positions import span_range
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
-from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, MEASURES, WITH_AXIS, WITH_INPUT
+from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, MEASURES, WITH_AXIS, WITH_INPUT, WITH_QUEUE
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
@@ -58,6 +61,12 @@ _SNIPPETS = {
         ("WHEN ... DO", "WHEN ${1:condition} DO\nBEGIN\n  BRAKE ;\n  $0\n  RESUME\nEND ;"),
         ("WHEN ... OFF", "WHEN ${1:name} OFF ;"),
     ),
+    "QUEUE": (
+        (
+            "QUEUE ... DO",
+            "QUEUE ${1:ARM_1} WITH CAPACITY = ${2:8} DO\nBEGIN\n  PUT ${3:frame} TO ${1:ARM_1} ;\n  $0\nEND ;",
+        ),
+    ),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "MODULE": (("MODULE ...", "MODULE ${1:name} ;"),),
     "RECORD": (("RECORD ...", "RECORD ${1:name} ;\n  ${2:field} : ${3:SCALAR} ;\nEND ;"),),
@@ -66,7 +75,7 @@ _SNIPPETS = {
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,BOOLEAN,TEXT,EVENT|} ;"),),
     "CONST": (("CONST ...", "CONST ${1:name} = ${2:value} ;"),),
 }
-_WITH_CLAUSES = (*VOCABULARIES[Standard.RLO_2].with_clauses, *WITH_CLAUSES_IN_CONTEXT)
+_WITH_CLAUSES = (*VOCABULARIES[Standard.RLO_2].with_clauses, *WITH_CLAUSES_IN_CONTEXT, *QUEUE_CLAUSES_IN_CONTEXT)
 # How a word that wants more is written on.
 _WORD_SNIPPETS = {
     "VIA": "VIA (${1:point})",
@@ -78,6 +87,7 @@ _WORD_SNIPPETS = {
     "RAISE": "RAISE ${1:kind} WITH ${2:text}",
     "PULSE": "PULSE ${1:device} FOR ${2:0.5s}",
     "TIMER": "TIMER ${1:name} ${2|ON,OFF,TO 0|}",
+    "PUT": "PUT ${1:frame} TO ${2:ARM_1}",
     "LOG": 'LOG "${1:name}" (${2:value})',
 }
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
@@ -85,6 +95,7 @@ _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
 _CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAUSES))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
+_BESIDE_CORRECTION = frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND", "TRACKING"))
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "TRACKING")),
@@ -97,6 +108,8 @@ _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DURATION": frozenset(("SPEED", "VELOCITY")),
     "VELOCITY": frozenset(("SPEED", "DURATION", "TRACKING")),
     **dict.fromkeys(("ROTATION", "ACCELERATION"), frozenset(("TRACKING",))),
+    "CORRECTION": _BESIDE_CORRECTION,
+    **dict.fromkeys(("BOUND", "RATE"), _BESIDE_CORRECTION),
     "TRACKING": frozenset(
         (
             *("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND"),
@@ -182,6 +195,7 @@ _ARGUMENT_RULES: Mapping[str, _OperandRule] = {
     **dict.fromkeys(WITH_INPUT, _OperandRule(inputs=True)),
     **dict.fromkeys(("OUTPUT", "SETTING"), _OperandRule(devices=True)),
     "TIMER": _OperandRule(),
+    **dict.fromkeys(WITH_QUEUE, _OperandRule(arms=True)),
     "DIST": _POSE,
     **dict.fromkeys(("INV", *MEASURES), _STEP),
     **{
@@ -280,6 +294,7 @@ def _allowed_words(expected: ExpectedTokens, context: LexicalContext, std: Stand
     if expected.starts_statement and "READ" in expected.words and std is Standard.RLO_2:
         yield from (f"{word} {other}" for word, other in STATEMENT_PHRASES.items())
         yield from (*STATEMENTS_BEFORE_TEXT, *STATEMENTS_BEFORE_NAME, "WHEN", *STATEMENTS_ALONE)
+        yield from (*STATEMENTS_BEFORE_ARM, *STATEMENTS_BEFORE_FRAME)
 
 
 class _ItemFactory:

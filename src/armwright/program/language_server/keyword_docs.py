@@ -18,6 +18,7 @@ class WordDoc(NamedTuple):
     text: str
 
 
+_QUEUE = "QUEUE arm [WITH CAPACITY | SPEED | VELOCITY | BLEND = number] DO statement"
 _MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY | CIRCULARLY] [VIA (poses)] [WITH ... = ...] [ON ... DO ...]"
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
@@ -108,7 +109,7 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION | TRACKING = value",
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION | VELOCITY | ROTATION | ACCELERATION | ... = value",
         "Specifies approach, departure, speed, rounding of corners, duration, limits of the tool, or a frame to track.",
     ),
     "APPROACH": ("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
@@ -135,6 +136,26 @@ _DOCS: Mapping[str, tuple[str, str]] = {
         "WITH TRACKING = frame",
         "The goal goes with a frame of the cell that moves; the arm comes to it, and follows it until its next MOVE.",
     ),
+    "CORRECTION": (
+        "WITH CORRECTION = length, WITH BOUND = length, WITH RATE = length",
+        "How far beside its line the path of a straight MOVE is to be, looked at while the arm moves, as by a sensor.",
+    ),
+    "BOUND": ("WITH BOUND = length", "How far a CORRECTION may move the path at most; more is an error."),
+    "RATE": ("WITH RATE = length", "How far a CORRECTION may move the path in a second."),
+    "QUEUE": (
+        _QUEUE,
+        "Lets an arm run along frames that PUT puts in meanwhile, without a stop, and ends when it stands at the last.",
+    ),
+    "PUT": (
+        "PUT frame TO arm [ELSE statement]",
+        "Puts a frame into the queue of an arm; where that is full, waits, or runs the statement behind ELSE instead.",
+    ),
+    "CAPACITY": (
+        "WITH CAPACITY = number | CAPACITY (arm)",
+        "How many frames of a queue may be ahead of its arm; 8 without it.",
+    ),
+    "QUEUED": ("QUEUED (arm)", "How many frames of its queue are ahead of an arm, the next among them."),
+    "AWAITED": ("AWAITED (arm, number)", "A frame of the queue of an arm: 1 is the one that it is on the way to."),
     # control
     "IF": (_IF, "Chooses between two statements."),
     "THEN": (_IF, "Precedes the statement that runs when the condition holds."),
@@ -255,6 +276,9 @@ _STATEMENT_WORDS: Mapping[tuple[str, str], tuple[str, str]] = {
         "TIMER name TO seconds",
         "Sets a timer, which runs on from there, or stands there.",
     ),
+    ("PUT", "TO"): ("PUT frame TO arm", "Precedes the arm whose queue gets the frame."),
+    ("PUT", "ELSE"): ("PUT frame TO arm ELSE statement", "Precedes what is done instead where the queue is full."),
+    ("QUEUE", "DO"): (_QUEUE, "Precedes the statements that fill the queue."),
     ("WHEN", "ON"): ("WHEN name ON", "Arms a WHEN again that was disarmed."),
     ("WHEN", "OFF"): ("WHEN name OFF", "Disarms a WHEN until it is armed again."),
     ("WHEN", "PRIORITY"): (

@@ -22,6 +22,8 @@ WITH_DEVICE = (*WITH_INPUT, "OUTPUT", "SETTING")
 WITH_KEY = (*WITH_DEVICE, "TIMER")
 # Functions whose argument is a name that is no variable.
 WITH_NAME = (*WITH_AXIS, *WITH_KEY)
+# Functions of the queue of an arm, which is their first argument.
+WITH_QUEUE = ("QUEUED", "CAPACITY", "AWAITED")
 # The goal of a MOVE by the positions of the joints, or by the name of a joint target of the cell.
 JOINTS = "JOINTS"
 # Procedures of programs may not have the names of these: all other functions came later than such programs.
@@ -68,6 +70,8 @@ FUNCTIONS: Mapping[str, Signature] = {
     **dict.fromkeys(("INPUT", "OUTPUT"), Signature("one name of the cell", 1, frozenset(), ExpressionType.CONDITION)),
     **dict.fromkeys(("ANALOG", "SETTING"), Signature("one name of the cell", 1, frozenset(), _NUMBER)),
     "TIMER": Signature("one name of a timer", 1, frozenset(), _NUMBER),
+    **dict.fromkeys(("QUEUED", "CAPACITY"), Signature("one arm", 1, _FRAMES, _NUMBER)),
+    "AWAITED": Signature("an arm and a number", 2, _FRAMES | _SCALARS, ExpressionType.FRAME),
     "RPY": Signature("three angles", 3, _SCALARS, _TRANS, "angle"),
     "ROT": Signature("the three components of an axis and an angle", 4, _SCALARS, _TRANS, "angle"),
     **dict.fromkeys(MEASURES, Signature("one FRAME or TRANS", 1, _POSES, _NUMBER)),
@@ -102,6 +106,9 @@ def result_type(
         return signature.result if key != "INV" else None
     if key in WITH_NAME:
         (_check_axis if key in WITH_AXIS else _check_key)(names, key, node.arguments[0])
+        return signature.result
+    if key in WITH_QUEUE:
+        _check_queue(names, key, node.arguments, argument_types)
         return signature.result
     for argument, argument_type in zip(node.arguments, argument_types, strict=True):
         if argument_type is ExpressionType.EVENT:
@@ -139,6 +146,24 @@ def _check_key(names: NameResolver, function: str, node: tree.Expression) -> Non
     name = {"input": "an input of the cell", "device": "a device of the cell"}.get(what, "a timer")
     text = f"{function} takes the name of {name}, not {quote_expression(node)}"
     names.report("E220", text, node.span, f"no {what}")
+
+
+def _check_queue(
+    names: NameResolver,
+    function: str,
+    arguments: Sequence[tree.Expression],
+    argument_types: Sequence[ExpressionType | None],
+) -> None:
+    arm, *numbers = arguments
+    if not isinstance(arm, tree.ArmName | tree.Poison):
+        text, advice = (
+            f"{function} takes an arm, not {quote_expression(arm)}",
+            f"write `{function}(ARM_1{', 1' * len(numbers)})`",
+        )
+        names.report("E220", text, arm.span, "no arm", advice=advice)
+    for argument, argument_type in zip(numbers, argument_types[1:], strict=True):
+        if argument_type is not None and argument_type not in _SCALARS:
+            names.report_type("E220", argument, argument_type, f"{function} takes an arm and a number")
 
 
 def _check_axis(names: NameResolver, function: str, node: tree.Expression) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.words import Standard
-from armwright.program.semantics import control_flow, devices, frames, functions, headers, move, output
+from armwright.program.semantics import control_flow, devices, frames, functions, headers, move, output, queues
 from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.calls import CallChecker
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell, ReadImport
@@ -13,7 +13,8 @@ from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
 
-CHECKS: Checks = {**frames.CHECKS, **devices.CHECKS, **move.CHECKS, **control_flow.CHECKS, **output.CHECKS}
+_FAMILIES = (frames, devices, move, queues, control_flow, output)
+CHECKS: Checks = {kind: check for family in _FAMILIES for kind, check in family.CHECKS.items()}
 
 
 def check(

@@ -26,6 +26,7 @@ class Context:
         procedure: the one that contains the statements; None for the main program.
         recovering: whether a RECOVER part contains them, so that RETRY can restart its TRY.
         watches: the WHENs with a name in the stretches of statements around them.
+        queues: by arm, the QUEUEs around them.
         interrupting: whether they are the action of a WHEN, or may be called by one.
     """
 
@@ -36,6 +37,7 @@ class Context:
     recovering: bool = False
     watches: dict[str, tree.When] = attrs.field(factory=dict)
     interrupting: bool = False
+    queues: dict[str, tree.Queue] = attrs.field(factory=dict)
 
     def check_list(self, *statements: tree.Statement) -> None:
         """Check a stretch of statements, at whose end its WHENs are disarmed."""

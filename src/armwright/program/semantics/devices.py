@@ -25,7 +25,7 @@ from armwright.program.syntax import tree
 def open_(context: Context, node: tree.Open) -> None:
     """Check arm and width of one OPEN."""
     names = context.names
-    _arm(names, node.arm, "OPEN")
+    check_arm(names, node.arm, "OPEN")
     if node.width is not None and require_quantity(names, node.width, "length", "OPEN ... TO needs a width"):
         check_range(names, node.width, "a width", zero=True)
 
@@ -86,7 +86,7 @@ def read_visions(context: Context, node: tree.ReadVisions) -> None:
             require_type(names, target, ExpressionType.FRAME, "E215", what)
 
 
-def _arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
+def check_arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
     """Check that a statement for arms names one."""
     if node is None or isinstance(node, tree.ArmName):
         return
@@ -112,11 +112,11 @@ def _arm(names: NameResolver, node: tree.Mobile | None, who: str) -> None:
 
 CHECKS: Checks = {
     tree.Open: open_,
-    tree.Grasp: lambda context, node: _arm(context.names, node.arm, "GRASP"),
+    tree.Grasp: lambda context, node: check_arm(context.names, node.arm, "GRASP"),
     tree.Operate: operate,
     tree.Pulse: pulse,
     tree.SetTimer: set_timer,
     tree.ReadVisions: read_visions,
-    tree.ReadSystem: lambda context, node: _arm(context.names, node.arm, "READ SYSTEM"),
-    tree.ZeroForce: lambda context, node: _arm(context.names, node.arm, "ZERO FORCE"),
+    tree.ReadSystem: lambda context, node: check_arm(context.names, node.arm, "READ SYSTEM"),
+    tree.ZeroForce: lambda context, node: check_arm(context.names, node.arm, "ZERO FORCE"),
 }

@@ -25,24 +25,26 @@ SPEED_NOTE = "100 is the normal speed and 120 the maximum of the arm"
 def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
+    _check_queue(context, node)
+    _check_correction(names, node)
     require_type(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
     if isinstance(node.goal, tree.Function) and is_joints(names.scope, node.goal):
         _check_joints(names, node, node.goal)
     else:
-        _check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
+        check_pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
     _check_combination(names, node.clauses)
     for clause in node.clauses:
         match clause:
             case tree.Via(points=points):
                 for point in points:
-                    _check_pose(names, point, "E212", "a via point must be a FRAME")
+                    check_pose(names, point, "E212", "a via point must be a FRAME")
             case tree.Approach(point=point) | tree.Departure(point=point):
                 article = "an approach" if isinstance(clause, tree.Approach) else "a departure"
-                _check_pose(names, point, "E215", f"{article} point must be a FRAME")
+                check_pose(names, point, "E215", f"{article} point must be a FRAME")
             case tree.Speed(value=value):
-                _check_speed(names, value)
+                check_speed(names, value)
             case tree.Blend() | tree.Duration() | tree.Velocity() | tree.Rotation() | tree.Acceleration():
-                _check_quantity(names, clause, clause.value)
+                check_quantity(names, clause, clause.value)
             case tree.Tracking(point=point):
                 _check_tracking(names, node, clause, point)
             case tree.On(condition=wanted, action=action, head=head):
@@ -51,9 +53,17 @@ def move(context: Context, node: tree.Move) -> None:
                 context.check_with(action, recovering=False)
 
 
-def _check_pose(
-    names: NameResolver, node: tree.Expression, code: str, what: str, move: tree.Move | None = None
-) -> None:
+def _check_queue(context: Context, node: tree.Move) -> None:
+    """Report a MOVE of an arm that runs along its queue."""
+    queue = context.queues.get(node.moved.key) if isinstance(node.moved, tree.ArmName) else None
+    if queue is not None:
+        arm = expression_text(node.moved)
+        text, here = f"{arm} cannot make a MOVE in its QUEUE", labels(queue.head, "its queue is open from here on")
+        advice = f"write `PUT ... TO {arm}`, or the MOVE behind the QUEUE"
+        context.names.report("E256", text, node.span, "it runs along its queue", secondary=here, advice=advice)
+
+
+def check_pose(names: NameResolver, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
     """Check a frame to come to."""
 
     def advice(actual: ExpressionType) -> str:
@@ -88,6 +98,40 @@ def _check_tracking(names: NameResolver, node: tree.Move, clause: tree.Clause, f
             text = f"TRACKING cannot be combined with {tree.clause_word(type(other))}"
             here, advice = labels(clause.span, "a frame is tracked here"), "write a MOVE of its own for the other leg"
             names.report("E248", text, other.span, "another way, or another speed", secondary=here, advice=advice)
+
+
+# What a path that is corrected on a straight line has nothing to do with.
+_CONFLICTS_WITH_CORRECTION = (
+    *(tree.Directly, tree.Circularly, tree.Via, tree.Approach, tree.Departure, tree.Blend, tree.Tracking),
+)
+
+
+def _check_correction(names: NameResolver, node: tree.Move) -> None:
+    """Check a MOVE whose path a sensor corrects: a line, with a bound and a rate."""
+    given = {type(clause): clause for clause in node.clauses}
+    correction = given.get(tree.Correction)
+    limits = [given[kind] for kind in (tree.Bound, tree.Rate) if kind in given]
+    for clause in limits:
+        if isinstance(clause, tree.Bound | tree.Rate):
+            check_quantity(names, clause, clause.value)
+        if correction is None:
+            text, advice = f"{tree.clause_word(type(clause))} is of a MOVE with CORRECTION", "leave it out"
+            names.report("E257", text, clause.span, "nothing is corrected", advice=advice)
+    if not isinstance(correction, tree.Correction):
+        return
+    require_quantity(names, correction.value, "length", "CORRECTION needs a length")
+    missing = [tree.clause_word(kind) for kind in (tree.Bound, tree.Rate) if kind not in given]
+    if missing:
+        advice = f"write `{', '.join(f'WITH {word} = ...' for word in missing)}` too"
+        names.report("E257", f"CORRECTION needs {' and '.join(missing)}", correction.span, "how far?", advice=advice)
+    if tree.Straightly not in given:
+        text, advice = "CORRECTION needs a straight line", "write STRAIGHTLY"
+        names.report("E257", text, correction.span, "beside which line?", advice=advice)
+    for other in node.clauses:
+        if isinstance(other, _CONFLICTS_WITH_CORRECTION):
+            text = f"CORRECTION cannot be combined with {tree.clause_word(type(other))}"
+            here, advice = labels(correction.span, "corrected here"), "write a MOVE of its own for the other leg"
+            names.report("E257", text, other.span, "another way", secondary=here, advice=advice)
 
 
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.
@@ -125,7 +169,8 @@ def _check_joints(names: NameResolver, node: tree.Move, goal: tree.Function) -> 
             names.report("E245", text, clause.span, "asks for a path of the tool", secondary=here, advice=advice)
 
 
-def _check_speed(names: NameResolver, node: tree.Expression) -> None:
+def check_speed(names: NameResolver, node: tree.Expression) -> None:
+    """Check that a SPEED is a number without a unit, one in the range of speeds where it is written."""
     is_number = require_type(names, node, ExpressionType.SCALAR, "E216", "SPEED needs a number or a SCALAR")
     if not is_number or not isinstance(node, tree.Number) or not check_unit(names, node, None, "a speed has no unit"):
         return
@@ -142,10 +187,12 @@ _QUANTITIES: dict[type, tuple[Dimension, str]] = {
     tree.Velocity: ("length", "a length per second"),
     tree.Rotation: ("angle", "an angle per second"),
     tree.Acceleration: ("length", "a length per second squared"),
+    tree.Bound: ("length", "a length"),
+    tree.Rate: ("length", "a length per second"),
 }
 
 
-def _check_quantity(names: NameResolver, clause: tree.Clause, value: tree.Expression) -> None:
+def check_quantity(names: NameResolver, clause: tree.Clause, value: tree.Expression) -> None:
     """Check a clause that is a quantity: a number above 0, whose unit fits where it has one."""
     (required, needs), word = _QUANTITIES[type(clause)], tree.clause_word(type(clause))
     if require_quantity(names, value, required, f"{word} needs {needs}"):
@@ -166,7 +213,7 @@ def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) ->
         _check_arc(names, circular, first)
     if len(first) > 1 or tree.Blend in first:
         _check_paths(names, first)
-        _check_durations(names, first)
+        check_durations(names, first)
 
 
 def _check_arc(names: NameResolver, circular: tree.Clause, first: dict[type, tree.Clause]) -> None:
@@ -216,7 +263,8 @@ def _check_going_over(names: NameResolver, blend: tree.Clause, first: dict[type,
         names.report("E226", text, duration.span, "of which part?", secondary=here, advice=advice)
 
 
-def _check_durations(names: NameResolver, first: dict[type, tree.Clause]) -> None:
+def check_durations(names: NameResolver, first: dict[type, tree.Clause]) -> None:
+    """Check that one clause alone tells how long a motion takes, of those given, by their kinds."""
     for kinds in ((tree.Speed, tree.Duration), (tree.Speed, tree.Velocity), (tree.Velocity, tree.Duration)):
         given = [clause for clause in map(first.get, kinds) if clause is not None]
         if len(given) < len(kinds):

@@ -118,7 +118,7 @@ def if_(tokens: TokenStream) -> tree.If:
     """Read one IF, and all that follow it with ELSE IF: they make a chain, which is long and not deep."""
     chain = [_if_then(tokens)]
     otherwise: tree.Statement | None = None
-    while _accept_else(tokens):
+    while accept_else(tokens):
         start = tokens.current
         if not tokens.matches("IF") or tokens.peek().key in ASSIGNMENT_SIGNS:
             otherwise = nested_statement(tokens, "ELSE")
@@ -146,7 +146,7 @@ def _if_then(tokens: TokenStream) -> tuple[Token, Span, tree.Expression, tree.St
     return start, head, condition, then
 
 
-def _accept_else(tokens: TokenStream) -> bool:
+def accept_else(tokens: TokenStream) -> bool:
     """Read ELSE, also behind a needless ``;``."""
     if tokens.accept("ELSE"):
         return True
@@ -448,7 +448,7 @@ def _limited(
     if tokens.accept_word("WITHIN"):
         limit = head_expression(tokens, "a number of seconds", "after WITHIN", "ELSE")
     head = tokens.span_since(start)
-    if limit is not None and _accept_else(tokens):
+    if limit is not None and accept_else(tokens):
         otherwise = nested_statement(tokens, "ELSE")
     return head, awaited, limit, otherwise
 

@@ -18,10 +18,13 @@ from armwright.program.syntax.token_stream import TokenStream, either
 
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
-_VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
+VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     tree.clause_word(kind): kind
-    for kind in (tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS, tree.Tracking)
-}
+    for kind in (
+        *(tree.Approach, tree.Departure, tree.Speed, tree.Blend, tree.Duration, *tree.TOOL_LIMITS),
+        *(tree.Correction, tree.Bound, tree.Rate, tree.Capacity),
+    )
+} | {"TRACKING": tree.Tracking}
 _CLAUSES_IN_CONTEXT = (*PLAIN_CLAUSES_IN_CONTEXT, *WITH_CLAUSES_IN_CONTEXT)
 
 
@@ -38,7 +41,7 @@ def move(tokens: TokenStream) -> tree.Move:
         if tokens.is_at_end:
             words = (f"WITH {word}" for word in _with_words(tokens))
             plain = _plain_words(tokens)
-            tokens.note_expected_words(*plain, *words, present_clauses=_clause_words(clauses))
+            tokens.note_expected_words(*plain, *words, present_clauses=clause_words(clauses))
         if not _starts_clause(tokens):
             if comma:
                 tokens.fail("expected a clause after `,`")
@@ -60,7 +63,7 @@ def _with_words(tokens: TokenStream) -> tuple[str, ...]:
     return (*words, *WITH_CLAUSES_IN_CONTEXT) if tokens.standard is Standard.RLO_2 else words
 
 
-def _clause_words(clauses: list[tree.Clause]) -> frozenset[str]:
+def clause_words(clauses: list[tree.Clause]) -> frozenset[str]:
     """Return the words by which clauses begin, behind WITH."""
     return frozenset(tree.clause_word(type(clause)) for clause in clauses)
 
@@ -91,6 +94,7 @@ def _starts_clause(tokens: TokenStream) -> bool:
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
 #        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" | "TRACKING" ) "=" expr
+#        | "WITH" ( "CORRECTION" | "BOUND" | "RATE" ) "=" expr
 #        | "ON" expr "DO" action ;
 def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | None:
     """Read one clause behind others; None when it has been reported and passed over."""
@@ -103,13 +107,13 @@ def _clause(tokens: TokenStream, others: list[tree.Clause]) -> tree.Clause | Non
         return _guard(tokens)
     tokens.take()
     if key == "WITH":
-        tokens.note_expected_words(*_with_words(tokens), present_clauses=_clause_words(others))
+        tokens.note_expected_words(*_with_words(tokens), present_clauses=clause_words(others))
         return _with_clause(tokens, token)
     if key in _with_words(tokens):
         if not token.damaged:
             text, advice, fix = f"{key} needs WITH before it", f"write `WITH {key} = ...`", Fix(token.gap, "WITH ")
             tokens.report("E116", text, token.span, "expected WITH before this", advice=advice, fixes=(fix,))
-        return _valued_clause(tokens, token, key)
+        return valued_clause(tokens, token, key)
     return _plain_clause(tokens, token, key)
 
 
@@ -164,13 +168,14 @@ def _with_clause(tokens: TokenStream, start: Token) -> tree.Clause | None:
     if key is None:
         tokens.fail("expected a clause after WITH", expected, code="E108")
     tokens.take()
-    return _valued_clause(tokens, start, key)
+    return valued_clause(tokens, start, key)
 
 
-def _valued_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause:
+def valued_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause:
+    """Read the sign of equality and the value of a clause, behind its word."""
     expect_equals(tokens, f"`WITH {key}`", f"WITH {key}")
     wants = "a pose" if key in ("APPROACH", "DEPARTURE", "TRACKING") else "a value"
-    return tokens.node(_VALUED_CLAUSES[key], start, expression(tokens, wants, f"after {key} ="))
+    return tokens.node(VALUED_CLAUSES[key], start, expression(tokens, wants, f"after {key} ="))
 
 
 # "ON" expr "DO" action

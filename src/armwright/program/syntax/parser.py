@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
-from armwright.program.syntax import control_flow, devices, frames, output, rlo83, tree
+from armwright.program.syntax import control_flow, devices, frames, output, queues, rlo83, tree
 from armwright.program.syntax.expected_tokens import ExpectedTokens
 from armwright.program.syntax.headers import late_header, parse_headers
 from armwright.program.syntax.lexer import Token, TokenKind
@@ -31,6 +31,8 @@ _RULES: Mapping[str, Rule] = {
     "READ": devices.read,
     "ZERO": devices.zero_force,
     "MOVE": move,
+    "QUEUE": queues.queue,
+    "PUT": queues.put,
     "(": control_flow.call,
     "BEGIN": control_flow.block,
     "IF": control_flow.if_,

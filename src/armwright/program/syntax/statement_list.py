@@ -13,6 +13,8 @@ from armwright.program.language.words import (
     FOREIGN_STATEMENTS,
     STATEMENT_PHRASES,
     STATEMENTS_ALONE,
+    STATEMENTS_BEFORE_ARM,
+    STATEMENTS_BEFORE_FRAME,
     STATEMENTS_BEFORE_NAME,
     STATEMENTS_BEFORE_TEXT,
     UNSUPPORTED_STATEMENTS,
@@ -32,6 +34,12 @@ _BEHIND_OPERAND = frozenset((*COMPARISONS, "+", "-", "*", "/", "AND", "OR", "DO"
 _BEGINNINGS = "statements begin with a keyword such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`"
 # What opens the stretch that a word ends, for one that ends none.
 _OPENER_OF = {"UNTIL": "REPEAT", "COEND": "COBEGIN", "PRIORITY": "COBEGIN", "RECOVER": "TRY"}
+# Words that start a statement in front of some kinds of tokens.
+_BEFORE_KINDS = (
+    (STATEMENTS_BEFORE_NAME, (_NAME,)),
+    (STATEMENTS_BEFORE_ARM, (_ARM,)),
+    (STATEMENTS_BEFORE_FRAME, (_NAME, _ARM)),
+)
 _OPENER_OF |= {"ELSE": "IF", "THEN": "IF", "DO": "WHILE or FOR"}
 
 
@@ -316,8 +324,9 @@ def _starts_phrase(tokens: TokenStream) -> bool:
         return _starts_when(tokens, after)
     if tokens.matches_word(*STATEMENTS_ALONE):
         return after.key not in (*ASSIGNMENT_SIGNS, "(", "[")
-    if tokens.matches_word(*STATEMENTS_BEFORE_NAME):
-        return after.kind is _NAME
+    for words, kinds in _BEFORE_KINDS:
+        if tokens.matches_word(*words):
+            return after.kind in kinds
     return after.kind is _NAME and STATEMENT_PHRASES.get(tokens.current.key) == after.key
 
 

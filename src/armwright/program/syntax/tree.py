@@ -212,6 +212,34 @@ class Tracking(Node):
 
 
 @attrs.frozen
+class Correction(Node):
+    """``WITH CORRECTION = length``: how far beside its line the path is to be, looked at while the arm moves."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Bound(Node):
+    """``WITH BOUND = length``: how far beside its line a path may be at most."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Rate(Node):
+    """``WITH RATE = length per second``: how fast a path may move sideways."""
+
+    value: Expression
+
+
+@attrs.frozen
+class Capacity(Node):
+    """``WITH CAPACITY = number``: how many frames a queue holds."""
+
+    value: Expression
+
+
+@attrs.frozen
 class On(Node):
     """``ON condition DO action``; ``head`` reaches from ON to the end of the condition."""
 
@@ -234,6 +262,10 @@ Clause: TypeAlias = (
     | Rotation
     | Acceleration
     | Tracking
+    | Correction
+    | Bound
+    | Rate
+    | Capacity
     | On
 )
 # Clauses that limit the tool.
@@ -252,6 +284,34 @@ class Move(Node):
     moved: Mobile
     goal: Expression
     clauses: tuple[Clause, ...]
+
+
+# The clauses of a queue.
+QUEUE_CLAUSES = (Capacity, Speed, Velocity, Blend)
+QUEUE_WORDS = tuple(clause_word(kind) for kind in QUEUE_CLAUSES)
+
+
+@attrs.frozen
+class Queue(Node):
+    """``QUEUE arm clauses DO statement``; ``head`` reaches up to DO."""
+
+    head: Span
+    arm: Mobile
+    clauses: tuple[Clause, ...]
+    body: "Statement"
+
+
+@attrs.frozen
+class Put(Node):
+    """``PUT frame TO arm [ELSE statement]``; ``head`` reaches up to ELSE."""
+
+    head: Span
+    frame: Expression
+    arm: Mobile
+    otherwise: "Statement | None" = None
+
+
+QueueStatement: TypeAlias = Queue | Put
 
 
 @attrs.frozen
@@ -503,7 +563,9 @@ OutputStatement: TypeAlias = Print | Log
 # What a FUNCTION is made of: it works out a value, and does nothing else.
 FUNCTION_STATEMENTS = (Assign, Block, If, While, Repeat, For, Raise, Return, Poison)
 
-Statement: TypeAlias = FrameStatement | DeviceStatement | Move | ControlStatement | OutputStatement | Poison
+Statement: TypeAlias = (
+    FrameStatement | DeviceStatement | Move | QueueStatement | ControlStatement | OutputStatement | Poison
+)
 
 
 @attrs.frozen

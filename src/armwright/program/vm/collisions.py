@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
@@ -82,6 +83,38 @@ def checked_stages(
         PendingStage(stage, names, machine.state.ticks + starts[k], check.clearances[k], done.paths.get(k))
         for k, (stage, (_, names)) in enumerate(zip(done.stages, planned, strict=True))
     ]
+
+
+def refuse_collision(
+    machine: Machine,
+    process: Process,
+    arm: str,
+    trajectory: Trajectory,
+    goal_at: tuple[str, Span],
+    *,
+    ahead: float = math.inf,
+) -> None:
+    """Look whether an arm that runs on along another path would run into something, as far ahead as is told [s].
+
+    Raises:
+        RunError: it would.
+    """
+    if machine.collisions is None:
+        return
+    hand = machine.state.hands[arm]
+    goal_part = _goal_part(machine, arm, trajectory)
+    move = PlannedMove(
+        arm=arm,
+        stages=(trajectory.until(min(ahead, trajectory.duration)),),
+        goal_part=goal_part,
+        after_force=hand.pressed,
+        on_force=False,
+    )
+    collision = _check(machine, move, clearances=False).collision
+    if collision is not None:
+        raise _error(machine, process, collision, arm, goal_at)
+    held = machine.hardware.part_poses().held_by(arm)
+    hand.beside, hand.pressed = frozenset({goal_part} if goal_part else ()) | hand.beside - set(held), False
 
 
 def _path_past(machine: Machine, speed: float, move: PlannedMove, stage: int, goals: Array) -> PlannedPath:

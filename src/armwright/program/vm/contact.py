@@ -70,10 +70,11 @@ def _stop_during_stage(machine: Machine, motion: Motion, local: float) -> int:
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(TrajectorySegment(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
     if motion.stage_index >= 0:
-        executed = join([last.trajectory.until(local), braking])
+        stage = machine.state.stages[motion.stage_index]
+        executed = join([stage.motion.until(machine.now - stage.t0), braking])
         efforts_before = [] if last.tau is None else [last.tau[: round(local / period)]]
         peak, when = peak_efforts(arm, np.concatenate([*efforts_before, tau]), period)
-        stage, length = machine.state.stages[motion.stage_index], tool_path_length(arm, executed)
+        length = tool_path_length(arm, executed)
         machine.state.stages[motion.stage_index] = attrs.evolve(
             stage, motion=executed, length=length, peak_effort=peak, peak_time=when, stopped=True
         )

@@ -18,6 +18,7 @@ from armwright.program.vm.process import (
     TryBlock,
     WaitReason,
 )
+from armwright.program.vm.queues import close_queues
 from armwright.program.vm.synchronization import abandon_wait, lock, release_locks, signal, unlock, wait
 from armwright.program.vm.tracking import stop_all_following
 from armwright.program.vm.wait_until import too_late, wait_until, wait_within
@@ -84,6 +85,7 @@ def end_process(machine: Machine, process: Process) -> None:
     """Take a process out of the run."""
     abandon_wait(machine, process)
     release_locks(machine, process, 0)
+    close_queues(machine, process, 0)
     process.done, process.watches = True, []
     process.motion = process.pending_effect = None
     # Where the branch after it could not begin, its COBEGIN has let none go.
@@ -106,7 +108,7 @@ def _pause(machine: Machine, process: Process, step: Instruction) -> None:
 def _try(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     kinds = tuple(map(str, step.operands[1:]))
     held, watches = len(process.locks), len(process.watches)
-    attempt = TryBlock(process.pc - 1, jump_target(step, 0), False, held, kinds, watches)
+    attempt = TryBlock(process.pc - 1, jump_target(step, 0), False, held, kinds, watches, len(process.queues))
     process.activation.try_blocks.append(attempt)
 
 
@@ -125,6 +127,7 @@ def _retry(machine: Machine, process: Process, step: Instruction) -> None:  # no
         try_blocks.pop()
     release_locks(machine, process, try_blocks[-1].lock_count)
     del process.watches[try_blocks[-1].watch_count :]
+    close_queues(machine, process, try_blocks[-1].queue_count)
     # TRY itself is run again and puts the attempt back.
     process.pc = try_blocks.pop().start
 
@@ -227,6 +230,7 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
             process.pc, process.message = try_block.recovery, error.diagnostic.message
             release_locks(machine, process, try_block.lock_count)
             del process.watches[try_block.watch_count :]
+            close_queues(machine, process, try_block.queue_count)
             code, line = error.diagnostic.code, machine.code.source.place(span.start)
             text = f"{code} in line {line}: {error.diagnostic.message}"
             machine.record_effect(process, "ERROR", text, span, data={"code": code, "kind": error.kind})

@@ -7,7 +7,8 @@ from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
-from armwright.program.vm.process import ElementReference, Process
+from armwright.program.vm.process import ElementReference, Process, Value
+from armwright.program.vm.queues import current_queue
 from armwright.program.vm.value_text import value_text
 
 # Components of a wrench: forces, then moments.
@@ -110,6 +111,22 @@ def _signal(machine: Machine, process: Process, step: Instruction) -> None:
     machine.write(process, step.operands[0], value != 0 if is_truth else value, step.span)
 
 
+def _queue(machine: Machine, process: Process, step: Instruction) -> None:
+    """Read how many frames are ahead of the arm, how many there may be, or where one of them is."""
+    queue = current_queue(machine, process, str(step.operands[1]), step.span)
+    ahead = queue.ahead(machine.now)
+    if step.op is not Op.AWAITED:
+        value: Value = float(ahead if step.op is Op.QUEUED else queue.capacity)
+    else:
+        asked = machine.read_number(process, step.operands[2], step.span)
+        if asked != round(asked) or not 1 <= asked <= ahead:
+            text = f"frame {asked:g} of the queue of {queue.arm} is not ahead"
+            label = f"there are {ahead}" if ahead else "there is none"
+            raise machine.error(process, "E222", text, step.span, label)
+        value = queue.frames[len(queue.frames) - ahead + round(asked) - 1]
+    machine.write(process, step.operands[0], value, step.span)
+
+
 HANDLERS: Mapping[Op, Handler] = {
     Op.LOADM: _load,
     Op.LOADS: _load,
@@ -121,6 +138,7 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.MESSAGE: _message,
     Op.TIMER: _timer,
     **dict.fromkeys((Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING), _signal),
+    **dict.fromkeys((Op.QUEUED, Op.CAPACITY, Op.AWAITED), _queue),
     Op.TEXT: _text,
     Op.LOADB: _truth,
 }

@@ -18,7 +18,7 @@ from armwright.motion.limited import limited_label
 from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
-from armwright.program.vm import control_flow, devices, expressions, frames, move, output
+from armwright.program.vm import control_flow, devices, expressions, frames, move, output, queues
 from armwright.program.vm.collisions import threatened_error
 from armwright.program.vm.contact import stop_too_deep
 from armwright.program.vm.control_flow import recover, shut_down, switched_off_text
@@ -39,7 +39,7 @@ _RECOVERABLE_ONCE = "R607"
 # A time this part of a period before a tick is on it.
 _TICK_TOLERANCE = 1e-6
 
-_FAMILIES = (expressions, frames, devices, move, control_flow, output)
+_FAMILIES = (expressions, frames, devices, move, queues, control_flow, output)
 HANDLERS: Mapping[Op, Handler] = {op: handler for family in _FAMILIES for op, handler in family.HANDLERS.items()}
 
 # Called now and then: the time on the clock [s], the line of the next statement.

@@ -42,11 +42,13 @@ from armwright.program.vm.contact import (
     stop_arm,
     update_depth_alarm,
 )
+from armwright.program.vm.corrections import begin_correction, correct, finish_correction, side_of, with_room
 from armwright.program.vm.machine import Handler, Machine
 from armwright.program.vm.move_diagnostics import CODES, detour_advice, obstacle_location, obstacle_message
 from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.moves_ahead import fits, goes_over, merged
 from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
+from armwright.program.vm.queues import require_no_queue
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.synchronization import release_locks
 from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, rest_of_following, stop_following
@@ -72,6 +74,7 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     moved = machine.resolve_name(process, request.begin.operands[0])
     arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim_arm(process, arm, step.span, moved)
+    require_no_queue(machine, process, arm, step.span)
     _require_idle_arm(machine, process, arm, step.span)
     if arm in machine.state.following and request.tracked is None:
         stop_following(machine, process, arm, step.span)
@@ -130,10 +133,16 @@ def _begin_move(
     machine.state.idle_steps += _STEPS_PER_MOVE
     tracking = None
     if request.tracked is not None:
-        stage, tracking = plan_tracking(machine, process, request, (arm, moved), _planner(machine, arm))
+        stage, tracking = plan_tracking(machine, process, request, (arm, moved), planner_of(machine, arm))
         planned: list[tuple[PlannedStage, tuple[str, ...]]] = [(stage, (request.form.goal,))]
     else:
         planned = _plan_stages(machine, process, request, arm, moved)
+    correction = request.correction
+    if correction is not None:
+        ((stage, names),) = planned
+        side = side_of(machine, process, arm, stage, request.span)
+        correction = attrs.evolve(correction, side=side)
+        planned = [(with_room(machine, stage, request.duration), names)]
     stages = checked_stages(machine, process, request, arm, planned)
     spelled = machine.spelling(moved)
     subject = arm if moved == arm else f"{arm} [{spelled}]"
@@ -155,6 +164,7 @@ def _begin_move(
         start=machine.next_start(),
         guards=request.guards,
         tracking=tracking,
+        correction=correction,
     )
     start_stage(machine, process, process.motion)
 
@@ -171,9 +181,13 @@ def advance_motion(machine: Machine, process: Process) -> None:
             process.stack.append(process.activation.create_nested("action", **fields))
             process.pc = guard.action
             return
+    due = motion.stage_end_tick
+    if motion.correction is not None:
+        correct(machine, process, motion)
+        due = min(motion.stage_end_tick, motion.correction.tick)
     if machine.state.ticks < motion.stage_end_tick:
         is_guarded = not all(guard.triggered for guard in motion.guards)
-        process.wake_tick = machine.state.ticks + 1 if is_guarded else motion.stage_end_tick
+        process.wake_tick = machine.state.ticks + 1 if is_guarded else due
     elif motion.stages:
         start_stage(machine, process, motion)
     else:
@@ -310,10 +324,15 @@ def _plan_stages(
         for legs in plans
     ]
     manner = Manner(
-        speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around, tool=request.tool
+        speed=request.speed,
+        deviation=cell.deviation,
+        period=cell.period,
+        # A correction is one of a straight line, and not of a detour.
+        around=cell.around if request.correction is None else None,
+        tool=request.tool,
     )
     try:
-        stages = plan(_planner(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
+        stages = plan(planner_of(machine, arm), machine.hardware.sent_configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except FlatArcError as error:
@@ -328,7 +347,7 @@ def _plan_stages(
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 
 
-def _planner(machine: Machine, arm: str) -> AnyArm:
+def planner_of(machine: Machine, arm: str) -> AnyArm:
     """Return what a MOVE is planned with: the functions of the arm, and the efforts of what it holds as well."""
     own, loaded = machine.cell.arms[arm].arm, machine.loaded_arm(arm)
     if loaded is own:
@@ -486,6 +505,9 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     if any(guard.reads_pose for guard in motion.guards):
         motion.hand_poses = machine.base_pose(motion.arm) @ forward(arm, trajectory(np.arange(counted + 1) * period))
     process.wake_tick = machine.state.ticks if motion.guards else motion.stage_end_tick
+    if motion.correction is not None:
+        begin_correction(machine, motion)
+        process.wake_tick = machine.state.ticks
 
 
 def _condition_holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
@@ -512,6 +534,8 @@ def finish_move(machine: Machine, process: Process, motion: Motion) -> None:
     if held and held != hand.reached_frame and arm not in machine.state.tree.ancestors(held):
         hand.held_frame = None
     record_contact(machine, motion)
+    if motion.correction is not None and motion.early_end is None:
+        finish_correction(machine, motion)
     contact_text, contact = contact_report(motion)
     text, since, data = motion.trace_text + contact_text, motion.start, {**motion.event_data, **contact}
     machine.record_effect(process, "MOVE", text, motion.span, since=since, arm=arm, data=data)

@@ -11,7 +11,7 @@ from armwright.program.bytecode.instructions import Code, Form, Instruction, Op,
 from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 from armwright.program.vm.machine import Machine, jump_target
-from armwright.program.vm.process import Guard, Process
+from armwright.program.vm.process import Correction, Guard, Process
 
 # The parts of a MOVE that are numbers.
 _NUMBERS = {
@@ -21,6 +21,8 @@ _NUMBERS = {
     Op.MVVEL: "velocity",
     Op.MVROT: "rotation",
     Op.MVACC: "acceleration",
+    Op.MVBND: "bound",
+    Op.MVRAT: "rate",
 }
 # The longest MOVE; more is a slip of units [s].
 _MAX_DURATION = 1e6
@@ -39,7 +41,7 @@ class Goal(NamedTuple):
 class MoveRequest(NamedTuple):
     """What the instructions of one MOVE ask for; the joint positions of its goal, or the joint target it is.
 
-    ``tracked`` is the frame of the cell with which the goal moves.
+    ``correction`` is that of its path by a sensor, and ``tracked`` the frame of the cell with which the goal moves.
 
     Of several MOVEs in one, ``fixed`` has the poses (4, 4) of the tool at their goals, in the base of the arm, and
     ``fixed_joints`` the joint positions (n,) there, where JOINTS asks for some.
@@ -56,6 +58,7 @@ class MoveRequest(NamedTuple):
     joints: Sequence[float] | str | None = None
     tool: ToolLimits | None = None
     tracked: str | None = None
+    correction: Correction | None = None
     fixed: Mapping[str, Array] = MappingProxyType({})
     fixed_joints: Mapping[str, Array] = MappingProxyType({})
 
@@ -122,7 +125,17 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         joints=joints,
         tool=ToolLimits(**limits) if limits else None,
         tracked=tracked,
+        correction=_correction(machine, parts, numbers),
     )
+
+
+def _correction(machine: Machine, parts: Sequence[Instruction], numbers: Mapping[Op, float]) -> Correction | None:
+    """Return how a sensor corrects the path of a MOVE; None where none does."""
+    corrected, metres = next((part for part in parts if part.op is Op.MVCOR), None), machine.code.units.metres
+    if corrected is None:
+        return None
+    bound, rate = numbers[Op.MVBND] * metres, numbers[Op.MVRAT] * metres
+    return Correction(code=jump_target(corrected, 0), result=str(corrected.operands[1]), bound=bound, rate=rate)
 
 
 def _goal(machine: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:

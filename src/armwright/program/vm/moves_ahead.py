@@ -12,7 +12,7 @@ from armwright.program.vm.process import MovesAhead, Process
 # As many lines at most are run without a stop between them.
 MOST_AHEAD = 50
 # What has another result, or another meaning, when the arm is somewhere else or at another time.
-_OF_THE_MOMENT = {Op.TIME, Op.MESSAGE, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING}
+_OF_THE_MOMENT = {Op.TIME, Op.MESSAGE, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.QUEUED, Op.AWAITED}
 # What is done at once while a MOVE waits for the next one: it works values out and decides what comes next.
 _AT_ONCE = {op for op in Op if "=" in op.signature} - _OF_THE_MOMENT
 _AT_ONCE |= {Op.COPY, Op.MUL, Op.ELEM, Op.JMP, Op.JZ, Op.FOR, Op.CALL, Op.CALLF, Op.RETV, Op.NORET}
@@ -41,7 +41,7 @@ def fits(ahead: MovesAhead, request: MoveRequest, moved: str) -> bool:
 
 def _is_one_stage(request: MoveRequest) -> bool:
     """Whether a MOVE is one LINE or one PTP, whose end nothing but its goal tells."""
-    if request.tracked is not None:
+    if request.tracked is not None or request.correction is not None:
         return False
     return (request.form.straight or request.form.direct) and not request.guards and request.duration is None
 

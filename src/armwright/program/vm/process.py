@@ -16,6 +16,8 @@ from armwright.program.language.source import Span
 from armwright.program.vm.recording import TimedKind
 
 if TYPE_CHECKING:
+    from armwright.motion.corrected_line import CorrectedLine
+    from armwright.motion.frame_queue import FrameQueue, Pace
     from armwright.physics.collisions import Collision, StageClearance
     from armwright.physics.planner import PlannedPath
     from armwright.program.vm.move_request import MoveRequest
@@ -56,6 +58,7 @@ class TryBlock:
         lock_count: how many locks the process held when it began.
         kinds: of the errors that it recovers from; empty for all.
         watch_count: how many WHENs the process had armed or disarmed when it began.
+        queue_count: how many queues it had opened.
     """
 
     start: int
@@ -64,6 +67,7 @@ class TryBlock:
     lock_count: int
     kinds: tuple[str, ...] = ()
     watch_count: int = 0
+    queue_count: int = 0
 
     def recovers_from(self, kind: str) -> bool:
         """Whether it recovers from a kind of error: not where it has failed already."""
@@ -300,6 +304,7 @@ class Motion:
         early_end: what ended it before its goal; None where nothing did.
         course: of its present stage, where that was resumed; None where it was not.
         stopped: where its present stage was stopped, which may be its end; None where that runs.
+        correction: by a sensor, of its path; None where there is none.
         tracking: of a frame that moves, which the arm follows when the MOVE is over; None where it does not.
     """
 
@@ -329,6 +334,7 @@ class Motion:
     course: Course | None = None
     stopped: StoppedOn | None = None
     tracking: Tracking | None = None
+    correction: Correction | None = None
 
     @property
     def trace_text(self) -> str:
@@ -344,6 +350,8 @@ class Motion:
             "speed": self.speed,
             "implied_affix": self.implied_affix,
         }
+        if self.correction is not None:
+            data["largest_correction"] = self.correction.largest
         if self.paths:
             data["planned_paths"] = [path.as_data() for path in self.paths]
         return data if self.early_end is None else {**data, self.early_end.value: True}
@@ -368,6 +376,60 @@ class MovesAhead:
     poses: tuple[Array, ...] = ()
     joints: tuple[Array | None, ...] = ()
     implied_affix: bool = False
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Correction:
+    """How a sensor corrects the path of a MOVE.
+
+    Attributes:
+        code: first instruction of what says how far beside its line the path is to be.
+        result: the value in passing that it leaves.
+        bound: how far it may be [m].
+        rate: how fast the path may move sideways [m/s].
+        side: (3,) where it moves, of length 1, in the base of the arm; zeros before the line is known.
+        line: that is corrected; None before it begins.
+        tick: when it is looked at next [ticks].
+        largest: the largest offset that was asked for [m].
+    """
+
+    code: int
+    result: str
+    bound: float
+    rate: float
+    side: Array = attrs.field(factory=lambda: np.zeros(3))
+    line: CorrectedLine | None = None
+    tick: int = 0
+    largest: float = 0.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RingQueue:
+    """The open queue of an arm.
+
+    Attributes:
+        arm: the arm.
+        span: the statement.
+        capacity: how many frames may be ahead of the arm.
+        pace: how fast it is run.
+        start: when it was opened.
+        path: on which the arm runs; None before the first frame.
+        labels: of the frames that were put in, as the program writes them, those that are passed too.
+        frames: (4, 4) their poses in the world.
+    """
+
+    arm: str
+    span: Span
+    capacity: int
+    pace: Pace
+    start: StartTime
+    path: FrameQueue | None = None
+    labels: tuple[str, ...] = ()
+    frames: tuple[Array, ...] = ()
+
+    def ahead(self, now: float) -> int:
+        """Return how many frames the arm has not passed."""
+        return 0 if self.path is None else len(self.labels) - self.path.passed(now)
 
 
 @attrs.frozen
@@ -435,6 +497,7 @@ class Process:
         message: of the error that it recovered from last.
         watches: the WHENs of the blocks that it is in, in the order of arming.
         judged_tick: when it has judged them last [ticks].
+        queues: the arms whose queues it has opened, in the order of opening.
     """
 
     path: tuple[int, ...] = ()
@@ -455,6 +518,7 @@ class Process:
     message: str = ""
     watches: list[Watch] = attrs.field(factory=list)
     judged_tick: int = -1
+    queues: list[str] = attrs.field(factory=list)
 
     @property
     def activation(self) -> Activation:

@@ -37,7 +37,7 @@ _TICK_TOLERANCE = 1e-6
 
 # Of statements that take time, and take effect at its end.
 TimedKind: TypeAlias = Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
-_MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP", "BRAKE", "RESUME"]
+_MotionKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "MOVE", "STOP", "BRAKE", "RESUME", "QUEUE", "PUT"]
 EffectKind: TypeAlias = (
     TimedKind | _MotionKind | Literal["ZERO", "SIGNAL", "WAIT", "WHEN", "TIMER", "LOCK", "PRINT", "LOG", "ERROR", "END"]
 )

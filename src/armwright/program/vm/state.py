@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Activation, Guard, Interruption, Motion, Process, Watch
+from armwright.program.vm.process import Activation, Guard, Interruption, Motion, Process, RingQueue, Watch
 from armwright.program.vm.recording import Effect, RunStage, ToolWrenches, TrajectorySegment
 
 
@@ -48,6 +48,7 @@ class MachineState:
         events: how often each was signalled and not yet waited for.
         timers: of each timer its seconds, and since which tick it runs; None where it is stopped.
         following: the arms that follow a frame that moves, each with the MOVE that has come to it.
+        queues: the open queue of each arm that has one.
         locks: which process holds each variable that is locked.
         owners: the processes that use each arm.
         hands: the gripper of each arm.
@@ -79,6 +80,7 @@ class MachineState:
     events: dict[str, int] = attrs.field(factory=dict)
     timers: dict[str, tuple[float, int | None]] = attrs.field(factory=dict)
     following: dict[str, Motion] = attrs.field(factory=dict)
+    queues: dict[str, RingQueue] = attrs.field(factory=dict)
     locks: dict[str, Process] = attrs.field(factory=dict)
     owners: dict[str, list[Process]] = attrs.field(factory=dict)
     pose_origins: dict[str, Span] = attrs.field(factory=dict)

@@ -155,13 +155,19 @@ def follow(machine: Machine, motion: Motion) -> None:
         machine.state.following[motion.arm] = motion
 
 
-def leave_frame(machine: Machine, arm: str) -> None:
-    """Let an arm follow a frame no more, since it begins another motion on the way."""
+def leave_frame(machine: Machine, arm: str) -> bool:
+    """Let an arm follow a frame, or its queue, no more, since it begins another motion on the way.
+
+    Returns:
+        Whether what it did began only now.
+    """
     motion = machine.state.following.pop(arm, None)
     if motion is None:
-        return
+        return False
     runs = machine.state.segments[arm]
-    local = machine.now - runs[-1].t0
+    local = min(machine.now - runs[-1].t0, runs[-1].duration)
+    if local == 0:
+        return True
     done = runs[-1].trajectory.until(local)
     runs[-1] = attrs.evolve(runs[-1], duration=local)
     stage, model = machine.state.stages[motion.stage_index], machine.cell.arms[arm].arm
@@ -170,6 +176,7 @@ def leave_frame(machine: Machine, arm: str) -> None:
         peak, when = peak_efforts(model, tau[: round(local / machine.cell.period) + 1], machine.cell.period)
         stage = attrs.evolve(stage, peak_effort=peak, peak_time=when)
     machine.state.stages[motion.stage_index] = attrs.evolve(stage, motion=done, length=length)
+    return False
 
 
 def rest_of_following(machine: Machine, arm: str) -> Trajectory | None:
@@ -192,7 +199,10 @@ def stop_following(machine: Machine, process: Process, arm: str, span: Span) -> 
 
 def stop_all_following(machine: Machine, process: Process, span: Span) -> int:
     """Stop the arms of a process that follow frames; return when they are at rest [ticks]."""
-    arms = [arm for arm in machine.state.following if process in machine.state.owners.get(arm, ())]
+    following, queues = machine.state.following, machine.state.queues
+    mine = [arm for arm in following if process in machine.state.owners.get(arm, ())]
+    # A branch may put frames into a queue that another process has opened, and that goes on.
+    arms = [arm for arm in mine if arm in process.queues or arm not in queues]
     return max((stop_following(machine, process, arm, span) for arm in arms), default=machine.state.ticks)
 
 

@@ -18,7 +18,9 @@ from armwright.program.vm.process import Course, EarlyEnd, Interruption, Motion,
 from armwright.program.vm.synchronization import record_wait
 
 # Values that change without a statement of the program.
-_READS_OUTSIDE = frozenset((Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.TIMER))
+_READS_OUTSIDE = frozenset(
+    (Op.TIME, Op.FORCE, Op.INPUT, Op.ANALOG, Op.OUTPUT, Op.SETTING, Op.TIMER, Op.QUEUED, Op.AWAITED)
+)
 # An arm so near to where it was braked has not been moved since [rad] or [m].
 _SAME_CONFIGURATION = 1e-9
 # No stage begins then: its path is checked for collisions anew.
@@ -212,6 +214,9 @@ def _resume(machine: Machine, process: Process, step: Instruction) -> None:
     if motion.tracking is not None:
         text, help_ = "a MOVE that tracks a frame cannot be resumed", "leave RESUME out, and track it with another MOVE"
         raise machine.error(process, "E409", text, step.span, "the frame has gone on", helps=[help_])
+    if motion.correction is not None:
+        text, help_ = "a MOVE whose path is corrected cannot be resumed", "leave RESUME out, and write another MOVE"
+        raise machine.error(process, "E412", text, step.span, "the line has been left", helps=[help_])
     interruption.motion, interruption.braked, process.motion = None, False, motion
     motion.stages[:0] = _stages_to_go_on(machine, motion)
     motion.rest_tick = motion.stopped = None
