@@ -217,7 +217,7 @@ def test_manifest() -> None:
     assert (EXTENSION / grammar["path"]).is_file()
     assert (grammar["language"], grammar["scopeName"]) == ("rlo", GRAMMAR["scopeName"])
     launch = debugger["configurationAttributes"]["launch"]["properties"]
-    assert list(launch) == ["program", "cell", "std", "strict", "stopOnEntry", "output"]
+    assert list(launch) == ["program", "cell", "arguments", "std", "strict", "stopOnEntry", "output"]
     assert all(
         set(configuration) - {"type", "request", "name"} <= set(launch)
         for configuration in debugger["initialConfigurations"]
