@@ -196,3 +196,37 @@ def test_names_of_the_first_edition() -> None:
 
     assert translate(Source("r.rlo", text)).diagnostics == ()
     assert re.search(r"var RECORD SCALAR", assembly(translate(Source("r.rlo", text)).code))  # type: ignore[arg-type]
+
+
+def test_one_message_for_a_record() -> None:
+    """A record that is wrong as a whole is told once, by its own name; what is wrong with one field, of that field."""
+    text = """\
+RECORD part ; weight : SCALAR ; place : FRAME ; label : TEXT ; END ;
+VAR a, b : part ; n : SCALAR ; s : ARRAY [2] OF part ;
+PROCEDURE both(INOUT x : part, INOUT y : part) ; BEGIN x.weight = 1 ; y.label = "y" END ;
+PROCEDURE set(INOUT x : part) ; BEGIN a.weight = 1 ; a.label = "a" ; x.weight = 2 END ;
+BEGIN
+  n = 1 ;
+  both(b, b) ;
+  both(s[n], s[n]) ;
+  set(a) ;
+  set(s[3]) ;
+  set(s[1,2]) ;
+  set(nothing) ;
+  s[1].weight = s[2].label ;
+  COBEGIN BEGIN b = a END ; BEGIN b = a END COEND ;
+END.
+"""
+    diagnostics = translate(Source("r.rlo", text)).diagnostics
+    told = [(text.count("\n", 0, one.span.start) + 1, one.code, one.message) for one in diagnostics]
+
+    assert [one for one in told if one[1] != "E303" and one[1] != "W204"] == [
+        (7, "E233", "`b` is passed twice to `both`, which may change it"),
+        (8, "E233", "`s[n]` may be passed twice to `both`, which may change it"),
+        (9, "E233", "`a` is passed to `set`, which uses it also by its own name"),
+        (10, "E222", "index 3 is outside 1..2"),
+        (11, "E222", "`s` has 1 index, not 2"),
+        (12, "E202", "`nothing` is not declared"),
+        (13, "E217", "`s[1].weight` is a SCALAR and takes a number, but `s[2].label` is a TEXT"),
+        (14, "W503", "`b` is written in two branches of one COBEGIN without LOCK"),
+    ]

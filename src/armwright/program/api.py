@@ -29,6 +29,7 @@ from armwright.program.modules.files import ParsedFile, parse_file, read_files
 from armwright.program.modules.linking import LinkedProgram, check_module, link
 from armwright.program.modules.names import declared_names
 from armwright.program.records.layout import RecordVariable, lay_out
+from armwright.program.records.messages import in_terms_of_records
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.cell_symbols import (
@@ -429,7 +430,7 @@ def _check_names(
         symbols=symbols,
         imports=imports,
         flow=None,
-        diagnostics=sort_diagnostics(diagnostics),
+        diagnostics=sort_diagnostics(in_terms_of_records(diagnostics, laid_out.variables)),
         code=None,
         cell=add_imported_frames(cell, imports) if isinstance(cell, Cell) else None,
         cell_symbols=cell_symbols,
@@ -449,6 +450,7 @@ def analyse_flow(compiled: Compilation) -> Compilation:
         flow, diagnostics = analysis.check(
             compiled.whole, compiled.symbols, compiled.spelling, cell_symbols, strict=strict, source=source
         )
+    diagnostics = in_terms_of_records(diagnostics, compiled.records)
     return attrs.evolve(compiled, flow=flow, diagnostics=sort_diagnostics((*compiled.diagnostics, *diagnostics)))
 
 
