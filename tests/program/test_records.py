@@ -11,6 +11,7 @@ from armwright.errors import InvalidValueError
 from armwright.program import Source, compile as translate, run
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.debugger.debugger import Debugger
+from armwright.program.debugger.expressions import ExpressionError
 from armwright.program.formatter.format import formatted
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
@@ -124,28 +125,70 @@ def test_random_records(sample: Sample) -> None:
         ]
 
 
-def test_debugger_shows_fields() -> None:
-    """Fields are variables and frames of their own, and the assignment of a record is one statement."""
+def stopped_at(text: str, statement: str) -> Debugger:
+    """Run a program up to a statement, from code that was written and read again."""
     cell = read_cell(EXAMPLES / "stanford_cell.toml")
-    code = translate(Source("parts.rlo", PARTS), cell).code
+    code = translate(Source("parts.rlo", text), cell).code
     assert code is not None
-    debugger = Debugger(code, cell)
+    debugger = Debugger(assemble(assembly(code)), cell)
     debugger.begin()
-    line = PARTS.splitlines().index("  b = slot[2] ;") + 1
-    debugger.add_breakpoint(line)
-    lines = []
-    for command in (None, "continue", "next"):
-        if command is not None:
-            debugger.resume(command)  # type: ignore[arg-type]
-        while debugger.running:
-            debugger.run_slice(1.0)
-        lines.append(code.source.line(debugger.stack(())[0].span.start))
-    shown = {one.name: one.value for scope in debugger.scopes(()) for one in (scope.children or tuple)()}
+    finish(debugger)
+    debugger.add_breakpoint(next(n for n, line in enumerate(text.splitlines(), 1) if statement in line))
+    resume(debugger, "continue")
+    return debugger
 
-    assert lines[1:] == [line, line + 1]
-    assert shown["a.weight"] == "2"
+
+def resume(debugger: Debugger, command: str) -> None:
+    debugger.resume(command)  # type: ignore[arg-type]
+    finish(debugger)
+
+
+def finish(debugger: Debugger) -> None:
+    while debugger.running:
+        debugger.run_slice(1.0)
+
+
+def test_debugger_shows_records() -> None:
+    """A record is one variable with its fields inside; its assignment is one statement."""
+    debugger = stopped_at(PARTS, "b = slot[2] ;")
+    line = debugger.code.source.line(debugger.stack(())[0].span.start)
+    resume(debugger, "next")
+    shown = {one.name: one for scope in debugger.scopes(()) for one in (scope.children or tuple)()}
+    slots = debugger.evaluate("SLOT", ())
+    assert slots.children is not None
+    second = debugger.evaluate("slot[1 + 1]", ())
+
+    assert debugger.code.source.line(debugger.stack(())[0].span.start) == line + 1
+    assert (shown["a"].type, shown["a"].value.split(",")[0]) == ("part", "weight = 2")
+    assert shown["a"].children is not None
+    assert [(one.name, one.expression, one.slot) for one in shown["a"].children()] == [
+        ("weight", "a.weight", "A.WEIGHT"),
+        ("place", "a.place", "A.PLACE"),
+        ("label", "a.label", "A.LABEL"),
+    ]
+    assert (slots.type, slots.value) == ("ARRAY [3] OF part", "3 elements")
+    assert [one.value for one in slots.children()][1] == second.value
+    assert second.children is not None
+    assert next((one.expression, one.value) for one in second.children()) == ("slot[1 + 1].weight", "17")
     assert debugger.evaluate("slot[2].weight + 1", ()).value == "18"
-    assert "a.place" in shown
+    assert "slot[2].place" in debugger.evaluate("frames", ()).value
+    for wrong, reason in (
+        ("slot[4]", "outside 1..3"),
+        ("a + 1", "is a record of the type part"),
+        ("a[1]", "has no index"),
+    ):
+        with pytest.raises(ExpressionError, match=reason):
+            debugger.evaluate(wrong, ())
+
+
+def test_debugger_shows_records_of_a_procedure() -> None:
+    """A parameter that is a record shows the fields of what was passed for it."""
+    debugger = stopped_at(PARTS, "p.weight = p.weight + by")
+    local = next(scope for scope in debugger.scopes(()) if scope.name == "Locals")
+    assert local.children is not None
+    found = {one.name: one for one in local.children()}
+
+    assert (found["p"].type, found["p"].value) == ("part", debugger.evaluate("p", ()).value)
 
 
 def in_editor(text: str) -> Analysis:
