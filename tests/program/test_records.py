@@ -19,6 +19,7 @@ from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
 from armwright.program.language_server.rename import rename
+from armwright.program.repl.session import Session
 from program.running import cell_of
 from samples import Sample
 
@@ -273,3 +274,10 @@ END.
         (13, "E217", "`s[1].weight` is a SCALAR and takes a number, but `s[2].label` is a TEXT"),
         (14, "W503", "`b` is written in two branches of one COBEGIN without LOCK"),
     ]
+
+
+def test_no_records_in_a_session() -> None:
+    """A session that is entered line by line refuses a record with one message, on however many lines it stands."""
+    session = Session()
+    for text in ("RECORD part ; n : SCALAR ; END ;", "RECORD part ;\n  n : SCALAR ;\n  m, k : FRAME ;\nEND ;"):
+        assert [one.code for one in session.enter(text, complete=True).diagnostics] == ["E260"]
