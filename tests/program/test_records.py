@@ -209,7 +209,10 @@ def test_hover_shows_fields() -> None:
     assert shown("b = slot") == f"b : part\n{fields}\ndeclared in line 7"
     assert shown("slot[2] ;") == f"slot : ARRAY [3] OF part\n{fields}\ndeclared in line 8"
     assert shown("p.weight + by") == "p.weight : SCALAR\nparameter of lift, declared in line 10"
-    assert hover(analysis, PARTS.index("].weight") + 3, markdown=False) is None
+    assert shown("].weight", 3) == "slot[3].weight : SCALAR\nfield of part, declared in line 3"
+    assert shown("  weight :", 3) == "weight : SCALAR\nfield of part"
+    for place, skip in (("RECORD part", 8), ("a, b : part", 8), ("OF part", 4), ("p : part", 5)):
+        assert shown(place, skip) == f"RECORD part\n{fields}\ndeclared in line 2"
     for place in ("b = slot", "a.weight = 2", "].weight = 7"):
         with pytest.raises(InvalidValueError):
             rename(analysis, PARTS.index(place) + place.startswith("]") * 3, "other")
@@ -221,8 +224,34 @@ def test_completion_offers_fields() -> None:
     cut = text.index("TO a.") + 5
     labels = [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
 
-    assert "a.place" in labels
-    assert "a.weight" not in labels
+    assert labels == ["a.place"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "labels"),
+    [
+        ("b = slot[n + 1].", ["weight", "place", "label"]),
+        ("MOVE ARM_1 TO slot[slot[1].weight].", ["weight", "place", "label"]),
+        ("a.", ["a.weight", "a.place", "a.label"]),
+        ("n = sl", ["slot[].weight"]),
+        ("n = (a.weight).", []),
+    ],
+)
+def test_completion_of_elements(typed: str, labels: list[str]) -> None:
+    """Behind the point of an element the fields stand alone; an array of records is offered with its index."""
+    text = PARTS.replace("  b = slot[2] ;", f"  {typed}")
+    cut = text.index(typed) + len(typed)
+    offered = [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
+
+    assert [one for one in offered if "." in typed or "slot" in one] == labels
+
+
+def test_completion_of_types() -> None:
+    """Where a type stands, the records are offered too."""
+    text = PARTS.replace("    n : SCALAR ;", "    n : ")
+    cut = text.index("    n : ") + len("    n : ")
+
+    assert "part" in [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
 
 
 @pytest.mark.parametrize("text", ["RECORD part", "RECORD part ; END ;", "RECORD part ; n : SCALAR", "RECORD ; END ;"])

@@ -28,7 +28,7 @@ from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.modules.files import ParsedFile, parse_file, read_files
 from armwright.program.modules.linking import LinkedProgram, check_module, link
 from armwright.program.modules.names import declared_names
-from armwright.program.records.layout import RecordVariable, lay_out
+from armwright.program.records.layout import RecordType, RecordVariable, lay_out
 from armwright.program.records.messages import in_terms_of_records
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
@@ -76,6 +76,7 @@ class Compilation:
         brought: the names that modules give, as this file may write them, with their keys in the whole.
         names: of each file, by its number, its names that have other keys in the whole.
         records: the variables that are records, by key: of the program, under the empty text, and of each procedure.
+        record_types: their types, and those that no variable has, by key.
     """
 
     source: Source
@@ -96,6 +97,7 @@ class Compilation:
     brought: Mapping[str, str] = attrs.field(factory=dict)
     names: Mapping[int, Mapping[str, str]] = attrs.field(factory=dict)
     records: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
+    record_types: Mapping[str, RecordType] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -427,6 +429,7 @@ def _check_names(
         tree=main.tree,
         whole=laid_out.tree,
         records=laid_out.variables,
+        record_types=laid_out.types,
         brought=linked.brought,
         names=linked.names,
         spelling=_name_spellings((main,) if files is None else files.files.values(), laid_out.tree),

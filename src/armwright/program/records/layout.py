@@ -69,11 +69,13 @@ class LaidOutProgram:
     Attributes:
         tree: what it says, with a variable for each field.
         variables: the records of the program, by key, and those of each procedure, by its key and theirs.
+        types: the types of records, by key.
         diagnostics: what is wrong with its records.
     """
 
     tree: tree.Program
     variables: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
+    types: Mapping[str, RecordType] = attrs.field(factory=dict)
     diagnostics: list[Diagnostic] = attrs.field(factory=list)
 
 
@@ -123,7 +125,7 @@ class _Layout:
                 if id(variable) not in self._used:
                     text = f"`{variable.name.text}` is never used"
                     self._report("L304", text, variable.name.span, "declared here")
-        return LaidOutProgram(tree=whole, variables=self._all, diagnostics=self._diagnostics)
+        return LaidOutProgram(tree=whole, variables=self._all, types=self._types, diagnostics=self._diagnostics)
 
     # ---- declarations ----------------------------------------------------------------------------------------------
 
