@@ -3,14 +3,24 @@
 const TYPED = 120; // a text is sent so long after the last key [ms]
 const editor = { version: 0, timer: null, lines: 0, problems: [], running: "" };
 const WORDS = new Map(Object.entries(data.words).flatMap(([kind, words]) => words.map((word) => [word, kind])));
+// Words that programs may use as names, where what is around them tells that they are words of the language.
+const CONTEXT = data.context.map(([kind, pattern]) => [kind, new RegExp(`${pattern}(?!\\w)`, "imy")]);
 const TOKEN = /(\{[^}]*\}?|\/\/[^\n]*)|("[^"\n]*"?)|(ARM[-_]\d+)|([A-Za-z_]\w*)|(\d+(?:\.\d+)?(?:E[+-]?\d+)?)/gi;
+
+function kindOfWord(text, at, word) {
+  const found = CONTEXT.find(([, pattern]) => {
+    pattern.lastIndex = at;
+    return pattern.test(text);
+  });
+  return found?.[0] ?? WORDS.get(word.toUpperCase());
+}
 
 function colouredText(text) {
   const pieces = [];
   let last = 0;
   for (const match of text.matchAll(TOKEN)) {
     const [token, comment, string, arm, word] = match;
-    const kind = comment ? "comment" : string ? "string" : arm ? "arm" : word ? WORDS.get(word.toUpperCase()) : "number";
+    const kind = comment ? "comment" : string ? "string" : arm ? "arm" : word ? kindOfWord(text, match.index, word) : "number";
     pieces.push({ from: last, to: match.index, kind: "" }, { from: match.index, to: match.index + token.length, kind: kind ?? "" });
     last = match.index + token.length;
   }
