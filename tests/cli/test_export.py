@@ -104,13 +104,17 @@ def test_mistakes_of_the_call(tmp_path: Path) -> None:
 def test_programs_and_motions(tmp_path: Path) -> None:
     """A language of a controller gets the program by default, and the motion of the run by --mode plan."""
     program = tmp_path / "loop.rlo"
-    loop = "VAR n : SCALAR ; BEGIN FOR n = 1 TO 3 DO MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.01) END."
+    loop = "CONST last = 9 ; VAR n : SCALAR ; BEGIN FOR n = 1 TO last DO MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.01) END."
     program.write_text(loop, encoding="utf-8")
     for mode, words, loops in (((), "the program, run for", 1), (("--mode", "plan"), "s of motion", 0)):
         out = tmp_path / words.split()[0]
-        done = armwright("export", "urscript", program, "--cell", UR5, *mode, "-o", out)
+        done = armwright("export", "urscript", program, "--cell", UR5, "--arg", "last=3", *mode, "-o", out)
         assert (done.returncode, words in done.stdout) == (0, True)
-        assert (out / "loop.script").read_text(encoding="ascii").count("while ") == loops
+        text = (out / "loop.script").read_text(encoding="ascii")
+        assert (text.count("while "), "9" in "".join(line for line in text.splitlines() if "while " in line)) == (
+            loops,
+            False,
+        )
     code = tmp_path / "loop.rlc"
     armwright("code", program, "--cell", UR5, "-o", code)
     done = armwright("export", "urscript", code, "--cell", UR5, "--mode", "program")

@@ -12,7 +12,14 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import BLOCK_CLOSERS, BLOCK_OPENERS, SENSORS
-from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
+from armwright.program.language_server.highlight import (
+    CONTEXT_PATTERNS,
+    DECLARATIONS,
+    KEYWORDS,
+    OPERATORS,
+    TYPES,
+    RloLexer,
+)
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from editors.textmate import Engine
@@ -91,7 +98,12 @@ def rules(node: Any) -> Iterator[Mapping[str, Any]]:
 
 def words_of(scope: str) -> list[str]:
     """Return the words of the rule that gives a scope to words alone."""
-    patterns = (rule["match"] for rule in rules(GRAMMAR) if rule.get("name") == scope and "match" in rule)
+    in_context = [rule["match"] for rule in rules(GRAMMAR["repository"]["context"]) if "match" in rule]
+    patterns = (
+        rule["match"]
+        for rule in rules(GRAMMAR)
+        if rule.get("name") == scope and rule.get("match", in_context[0]) not in in_context
+    )
     (words,) = (found[1] for pattern in patterns if (found := re.match(r"\(\?i\)\(\?:([A-Z0-9|]+)\)\(\?[=!]", pattern)))
     return words.split("|")
 
@@ -137,6 +149,16 @@ def test_word_in_any_case(word: str) -> None:
     for written in (word, word.lower(), word.capitalize()):
         assert [(piece, scope) for piece, scope in Engine(GRAMMAR).pieces(written) if piece] == [(written, expected)]
     assert set(by_grammar(f"{word}x")) == {(character, Name) for character in f"{word}x"}
+
+
+def test_words_in_context() -> None:
+    """The grammar has the patterns of the words that are names elsewhere."""
+    scopes = {"declaration": "keyword.declaration.rlo", "type": "storage.type.rlo", "keyword": "keyword.control.rlo"}
+    written = [(rule["name"], rule["match"]) for rule in GRAMMAR["repository"]["context"]["patterns"]]
+
+    assert written == [
+        (scopes[kind], f"(?i){pattern}") for kind, pattern in CONTEXT_PATTERNS if not pattern.startswith("FUNCTION")
+    ]
 
 
 def test_sensors() -> None:
@@ -217,7 +239,7 @@ def test_manifest() -> None:
     assert (EXTENSION / grammar["path"]).is_file()
     assert (grammar["language"], grammar["scopeName"]) == ("rlo", GRAMMAR["scopeName"])
     launch = debugger["configurationAttributes"]["launch"]["properties"]
-    assert list(launch) == ["program", "cell", "std", "strict", "stopOnEntry", "output"]
+    assert list(launch) == ["program", "cell", "arguments", "std", "strict", "stopOnEntry", "output"]
     assert all(
         set(configuration) - {"type", "request", "name"} <= set(launch)
         for configuration in debugger["initialConfigurations"]

@@ -15,6 +15,7 @@ from armwright.files.limits import raised
 from armwright.program import Compilation, Source, compile as translate, run
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Code
+from armwright.program.debugger.debugger import Debugger
 from armwright.program.diagnostics.fixes import apply_fixes
 from armwright.program.diagnostics.render import render
 from armwright.program.diagnostics.sarif import to_sarif
@@ -418,6 +419,50 @@ def test_debug_adapter() -> None:
         assert client.line() == 15
 
 
+BOXES = """MODULE boxes ;
+RECORD box ; weight : SCALAR ; END ;
+VAR n, own : SCALAR ; b : box ; row : ARRAY [2] OF box ;
+FUNCTION twice(v : SCALAR) : SCALAR ;
+BEGIN
+  RETURN 2 * v * n
+END ;
+PROCEDURE put(INOUT p : box) ;
+BEGIN
+  p.weight = n + own
+END ;
+BEGIN
+  n = 3 ; own = 5 ; b.weight = 1 ; row[1] = b ; row[2] = b ;
+END.
+"""
+
+
+def test_debugger_knows_names_of_modules() -> None:
+    """An expression means what it means in the file of the place where the program stands."""
+    main = 'IMPORT "boxes.rlo" AS g ;\nVAR n : SCALAR ;\nBEGIN\n  n = 1 ; g.put(g.row[2]) ; PRINT(n)\nEND.\n'
+    cell = cell_of("cell1")
+    program = compiled(main, {"boxes.rlo": BOXES}, cell)
+    assert program.code is not None
+    assert assemble(assembly(program.code)) == program.code
+    debugger = Debugger(program.code, cell)
+    debugger.begin()
+    debugger.add_breakpoint(4, 30)
+    debugger.add_breakpoint(10, file=1, condition="boxes.n = 3 AND n = 3 AND g.own = own AND own = 5")
+    seen = []
+    while debugger.running:
+        debugger.run_slice(1.0)
+    for _ in range(2):
+        debugger.resume("continue")
+        while debugger.running:
+            debugger.run_slice(1.0)
+        names = ("n", "g.n", "boxes.n", "g.own", "g.twice(2)", "g.b.weight", "g.row[1 + 1].weight", "g.row[2]")
+        seen.append([debugger.evaluate(name, ()).value for name in names])
+
+    assert seen == [
+        ["3", "3", "3", "5", "12", "1", "1", "weight = 1"],
+        ["1", "3", "3", "5", "12", "1", "8", "weight = 8"],
+    ]
+
+
 def in_editor(folder: Path) -> tuple[Analysis, str]:
     """Analyse a program beside a module as an editor does; return it with its text."""
     (folder / "lib").mkdir()
@@ -438,6 +483,10 @@ def test_hover_and_definition_cross_files(tmp_path: Path) -> None:
     declared = analysis.declaration(named)
     assert declared is not None
     place = analysis.location("file:///main.rlo", declared.span)
+    for at in (text.index("jaw ;"), text.index("jaw.width") + 1, text.index("jaw.take")):
+        module = hover(analysis, at, markdown=False)
+        assert module is not None
+        assert module.contents.value == "MODULE jaw\nfile lib/g.rlo\ngives take, width, n"  # type: ignore[union-attr]
 
     assert shown.contents.value == "width : SCALAR\ndeclared in line 2 of lib/g.rlo"  # type: ignore[union-attr]
     assert place.uri == (tmp_path / "lib" / "g.rlo").as_uri()
@@ -452,7 +501,8 @@ def test_completion_knows_modules(tmp_path: Path) -> None:
     values = [item.label for item in completions(analysis.codec, analysis, text.index("jaw.width") + 4, snippets=False)]
     starts = [item.label for item in completions(analysis.codec, analysis, text.index("jaw.take"), snippets=False)]
 
-    assert {"n", "jaw.width", "jaw.n"} <= {*values}
+    assert {*values} == {"jaw.width", "jaw.n"}
+    assert "n" in starts
     assert "jaw.take" in starts
     assert not {"width", "take"} & {*values, *starts}
 

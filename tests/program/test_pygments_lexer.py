@@ -8,10 +8,14 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
-from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
+from armwright.program.language.words import SENSORS, VOCABULARIES, WORDS_IN_CONTEXT, Standard
+from armwright.program.language_server.analysis import Settings, analyse
+from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
+from armwright.program.language_server.symbol_index import NameKind
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax.lexer import TokenKind, scan
@@ -208,9 +212,52 @@ def test_as_the_translator_reads(path: Path) -> None:
         (token.text, token.kind, kinds.get(token.start))
         for token in scan(source, blank_line_numbers(source)[0]).tokens[:-1]
         if not any(kinds.get(token.start) in colour for colour in COLOURS[token.kind])
+        and not (token.key in WORDS_IN_CONTEXT and kinds.get(token.start) in Keyword)
     ]
 
     assert odd == []
+
+
+@pytest.mark.drawn(0.2)
+@pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
+def test_names_are_no_words(path: Path) -> None:
+    """What the compiler takes for a variable, a procedure or a device never has the colour of a word."""
+    text = path.read_text(encoding="utf-8")
+    analysis = analyse(path.name, PositionCodec(text), path.parent, CellCache(), Settings())
+    kinds = {start: kind for start, kind, _ in RloLexer().get_tokens_unprocessed(text)}
+    named = (NameKind.VARIABLE, NameKind.PROCEDURE, NameKind.DEVICE, NameKind.TIMER, NameKind.ERROR)
+
+    assert [it.key for it in analysis.occurrences if it.kind in named and kinds[it.start] in Keyword] == []
+
+
+def test_words_in_context() -> None:
+    """Words that may be names have the colour of words where they are words, and of names where they are names."""
+    text = """\
+CONST a = 1 ; { CONST RECORD RECORD }
+RECORD part ; w : TEXT ; END ;
+FUNCTION twice(IN n : SCALAR, INOUT m : BOOLEAN) : SCALAR ; BEGIN RETURN 2 * n END ;
+BEGIN
+  WHEN door : x > 3 DO BEGIN BRAKE ; RESUME END ;
+  WHEN PRIORITY 2 : NOT y DO BRAKE ;
+  TIMER t ON ; LOG "a" (n) ; PULSE v FOR 3 ; RAISE jam WITH "x" ;
+  MOVE ARM_1 TO f CIRCULARLY, VIA (b), WITH VELOCITY = 3, WITH TRACKING = belt ;
+  WAIT UNTIL x WITHIN 3 ELSE HALT ;
+END.
+"""
+    words = [word for kind, word in coloured(text) if kind in Keyword and word in WORDS_IN_CONTEXT]
+    assert words == [
+        *("CONST", "RECORD", "TEXT", "FUNCTION", "IN", "INOUT", "BOOLEAN", "RETURN", "WHEN", "BRAKE", "RESUME"),
+        *("WHEN", "BRAKE", "TIMER", "LOG", "PULSE", "RAISE", "CIRCULARLY", "VELOCITY", "TRACKING", "WITHIN"),
+    ]
+    for word in sorted(WORDS_IN_CONTEXT | {"MODULE", "AS"}):
+        uses = (
+            f"VAR a, {word} : SCALAR ;\nBEGIN\n  {word} = 1 ;\n  a = {word} ;\n  a = 2 * {word} + {word} ;\n"
+            f"  IF {word} > 1 AND {word} = 3 THEN {word} = 2 ELSE a = {word} ;\n  WHILE a < {word} DO {word}(a) ;\n"
+            f"  PRINT({word}, {word}[2], a, {word}) ;\n  MOVE ARM_1 TO {word} ;\n  LOCK ({word}) DO SIGNAL {word} ;\n"
+            f"  PAUSE {word} ; WAIT {word} ; FOR {word} = {word} TO {word} STEP {word} DO ;\nEND.\n"
+        )
+        names = [kind for kind, found in coloured(uses) if found == word and kind in Keyword]
+        assert names == [], word
 
 
 @settings(max_examples=examples(300))

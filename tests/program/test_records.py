@@ -11,6 +11,7 @@ from armwright.errors import InvalidValueError
 from armwright.program import Source, compile as translate, run
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.debugger.debugger import Debugger
+from armwright.program.debugger.expressions import ExpressionError
 from armwright.program.formatter.format import formatted
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analysis import Analysis, Settings, analyse
@@ -18,6 +19,7 @@ from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
 from armwright.program.language_server.rename import rename
+from armwright.program.repl.session import Session
 from program.running import cell_of
 from samples import Sample
 
@@ -124,28 +126,70 @@ def test_random_records(sample: Sample) -> None:
         ]
 
 
-def test_debugger_shows_fields() -> None:
-    """Fields are variables and frames of their own, and the assignment of a record is one statement."""
+def stopped_at(text: str, statement: str) -> Debugger:
+    """Run a program up to a statement, from code that was written and read again."""
     cell = read_cell(EXAMPLES / "stanford_cell.toml")
-    code = translate(Source("parts.rlo", PARTS), cell).code
+    code = translate(Source("parts.rlo", text), cell).code
     assert code is not None
-    debugger = Debugger(code, cell)
+    debugger = Debugger(assemble(assembly(code)), cell)
     debugger.begin()
-    line = PARTS.splitlines().index("  b = slot[2] ;") + 1
-    debugger.add_breakpoint(line)
-    lines = []
-    for command in (None, "continue", "next"):
-        if command is not None:
-            debugger.resume(command)  # type: ignore[arg-type]
-        while debugger.running:
-            debugger.run_slice(1.0)
-        lines.append(code.source.line(debugger.stack(())[0].span.start))
-    shown = {one.name: one.value for scope in debugger.scopes(()) for one in (scope.children or tuple)()}
+    finish(debugger)
+    debugger.add_breakpoint(next(n for n, line in enumerate(text.splitlines(), 1) if statement in line))
+    resume(debugger, "continue")
+    return debugger
 
-    assert lines[1:] == [line, line + 1]
-    assert shown["a.weight"] == "2"
+
+def resume(debugger: Debugger, command: str) -> None:
+    debugger.resume(command)  # type: ignore[arg-type]
+    finish(debugger)
+
+
+def finish(debugger: Debugger) -> None:
+    while debugger.running:
+        debugger.run_slice(1.0)
+
+
+def test_debugger_shows_records() -> None:
+    """A record is one variable with its fields inside; its assignment is one statement."""
+    debugger = stopped_at(PARTS, "b = slot[2] ;")
+    line = debugger.code.source.line(debugger.stack(())[0].span.start)
+    resume(debugger, "next")
+    shown = {one.name: one for scope in debugger.scopes(()) for one in (scope.children or tuple)()}
+    slots = debugger.evaluate("SLOT", ())
+    assert slots.children is not None
+    second = debugger.evaluate("slot[1 + 1]", ())
+
+    assert debugger.code.source.line(debugger.stack(())[0].span.start) == line + 1
+    assert (shown["a"].type, shown["a"].value.split(",")[0]) == ("part", "weight = 2")
+    assert shown["a"].children is not None
+    assert [(one.name, one.expression, one.slot) for one in shown["a"].children()] == [
+        ("weight", "a.weight", "A.WEIGHT"),
+        ("place", "a.place", "A.PLACE"),
+        ("label", "a.label", "A.LABEL"),
+    ]
+    assert (slots.type, slots.value) == ("ARRAY [3] OF part", "3 elements")
+    assert [one.value for one in slots.children()][1] == second.value
+    assert second.children is not None
+    assert next((one.expression, one.value) for one in second.children()) == ("slot[1 + 1].weight", "17")
     assert debugger.evaluate("slot[2].weight + 1", ()).value == "18"
-    assert "a.place" in shown
+    assert "slot[2].place" in debugger.evaluate("frames", ()).value
+    for wrong, reason in (
+        ("slot[4]", "outside 1..3"),
+        ("a + 1", "is a record of the type part"),
+        ("a[1]", "has no index"),
+    ):
+        with pytest.raises(ExpressionError, match=reason):
+            debugger.evaluate(wrong, ())
+
+
+def test_debugger_shows_records_of_a_procedure() -> None:
+    """A parameter that is a record shows the fields of what was passed for it."""
+    debugger = stopped_at(PARTS, "p.weight = p.weight + by")
+    local = next(scope for scope in debugger.scopes(()) if scope.name == "Locals")
+    assert local.children is not None
+    found = {one.name: one for one in local.children()}
+
+    assert (found["p"].type, found["p"].value) == ("part", debugger.evaluate("p", ()).value)
 
 
 def in_editor(text: str) -> Analysis:
@@ -165,7 +209,10 @@ def test_hover_shows_fields() -> None:
     assert shown("b = slot") == f"b : part\n{fields}\ndeclared in line 7"
     assert shown("slot[2] ;") == f"slot : ARRAY [3] OF part\n{fields}\ndeclared in line 8"
     assert shown("p.weight + by") == "p.weight : SCALAR\nparameter of lift, declared in line 10"
-    assert hover(analysis, PARTS.index("].weight") + 3, markdown=False) is None
+    assert shown("].weight", 3) == "slot[3].weight : SCALAR\nfield of part, declared in line 3"
+    assert shown("  weight :", 3) == "weight : SCALAR\nfield of part"
+    for place, skip in (("RECORD part", 8), ("a, b : part", 8), ("OF part", 4), ("p : part", 5)):
+        assert shown(place, skip) == f"RECORD part\n{fields}\ndeclared in line 2"
     for place in ("b = slot", "a.weight = 2", "].weight = 7"):
         with pytest.raises(InvalidValueError):
             rename(analysis, PARTS.index(place) + place.startswith("]") * 3, "other")
@@ -177,8 +224,34 @@ def test_completion_offers_fields() -> None:
     cut = text.index("TO a.") + 5
     labels = [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
 
-    assert "a.place" in labels
-    assert "a.weight" not in labels
+    assert labels == ["a.place"]
+
+
+@pytest.mark.parametrize(
+    ("typed", "labels"),
+    [
+        ("b = slot[n + 1].", ["weight", "place", "label"]),
+        ("MOVE ARM_1 TO slot[slot[1].weight].", ["weight", "place", "label"]),
+        ("a.", ["a.weight", "a.place", "a.label"]),
+        ("n = sl", ["slot[].weight"]),
+        ("n = (a.weight).", []),
+    ],
+)
+def test_completion_of_elements(typed: str, labels: list[str]) -> None:
+    """Behind the point of an element the fields stand alone; an array of records is offered with its index."""
+    text = PARTS.replace("  b = slot[2] ;", f"  {typed}")
+    cut = text.index(typed) + len(typed)
+    offered = [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
+
+    assert [one for one in offered if "." in typed or "slot" in one] == labels
+
+
+def test_completion_of_types() -> None:
+    """Where a type stands, the records are offered too."""
+    text = PARTS.replace("    n : SCALAR ;", "    n : ")
+    cut = text.index("    n : ") + len("    n : ")
+
+    assert "part" in [one.label for one in completions(PositionCodec(text), in_editor(PARTS), cut, snippets=False)]
 
 
 @pytest.mark.parametrize("text", ["RECORD part", "RECORD part ; END ;", "RECORD part ; n : SCALAR", "RECORD ; END ;"])
@@ -196,3 +269,44 @@ def test_names_of_the_first_edition() -> None:
 
     assert translate(Source("r.rlo", text)).diagnostics == ()
     assert re.search(r"var RECORD SCALAR", assembly(translate(Source("r.rlo", text)).code))  # type: ignore[arg-type]
+
+
+def test_one_message_for_a_record() -> None:
+    """A record that is wrong as a whole is told once, by its own name; what is wrong with one field, of that field."""
+    text = """\
+RECORD part ; weight : SCALAR ; place : FRAME ; label : TEXT ; END ;
+VAR a, b : part ; n : SCALAR ; s : ARRAY [2] OF part ;
+PROCEDURE both(INOUT x : part, INOUT y : part) ; BEGIN x.weight = 1 ; y.label = "y" END ;
+PROCEDURE set(INOUT x : part) ; BEGIN a.weight = 1 ; a.label = "a" ; x.weight = 2 END ;
+BEGIN
+  n = 1 ;
+  both(b, b) ;
+  both(s[n], s[n]) ;
+  set(a) ;
+  set(s[3]) ;
+  set(s[1,2]) ;
+  set(nothing) ;
+  s[1].weight = s[2].label ;
+  COBEGIN BEGIN b = a END ; BEGIN b = a END COEND ;
+END.
+"""
+    diagnostics = translate(Source("r.rlo", text)).diagnostics
+    told = [(text.count("\n", 0, one.span.start) + 1, one.code, one.message) for one in diagnostics]
+
+    assert [one for one in told if one[1] != "E303" and one[1] != "W204"] == [
+        (7, "E233", "`b` is passed twice to `both`, which may change it"),
+        (8, "E233", "`s[n]` may be passed twice to `both`, which may change it"),
+        (9, "E233", "`a` is passed to `set`, which uses it also by its own name"),
+        (10, "E222", "index 3 is outside 1..2"),
+        (11, "E222", "`s` has 1 index, not 2"),
+        (12, "E202", "`nothing` is not declared"),
+        (13, "E217", "`s[1].weight` is a SCALAR and takes a number, but `s[2].label` is a TEXT"),
+        (14, "W503", "`b` is written in two branches of one COBEGIN without LOCK"),
+    ]
+
+
+def test_no_records_in_a_session() -> None:
+    """A session that is entered line by line refuses a record with one message, on however many lines it stands."""
+    session = Session()
+    for text in ("RECORD part ; n : SCALAR ; END ;", "RECORD part ;\n  n : SCALAR ;\n  m, k : FRAME ;\nEND ;"):
+        assert [one.code for one in session.enter(text, complete=True).diagnostics] == ["E260"]

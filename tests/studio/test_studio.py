@@ -572,6 +572,54 @@ def test_imports(pages: Pages) -> None:
     assert "none.toml" in pages.state()["program"]["diagnostics"][0]["text"]
 
 
+MODULE = """\
+MODULE ways ;
+VAR high, low : FRAME ;
+PROCEDURE up ;
+BEGIN
+  MOVE ARM_1 TO high ;
+END ;
+END.
+"""
+
+
+def test_modules(pages: Pages) -> None:
+    """A program runs with modules below its folder; places in them are told with their file, as the files are now."""
+    folder = pages.file.path.parent
+    (folder / "lib").mkdir()
+    module = folder / "lib" / "ways.rlo"
+    module.write_text(MODULE.replace("high ;", "hgih ;"))
+    text = "IMPORT 'lib/ways.rlo' AS way ;\nBEGIN\n  way.up() ;\n  MOVE ARM_1 TO way.low ;\nEND.\n".replace("'", '"')
+    assert pages.send("text", text=text, version=0) == ""
+    (problem,) = [it for it in pages.state()["program"]["diagnostics"] if it["severity"] == "error"]
+    assert (problem["code"], problem["file"], problem["line"], problem["start"]) == ("E202", "lib/ways.rlo", 5, None)
+    assert pages.send("run") == "line 5 of lib/ways.rlo: E202: `hgih` is not declared"
+
+    module.write_text(MODULE)
+    assert pages.send("run", entry=True) == ""
+    pages.wait(1.0)
+    pages.send("go", step="in")
+    pages.wait(1.0)
+    (line,) = pages.state()["run"]["lines"]
+    assert (line["process"], line["line"], line["place"]) == ("up", 3, "5 of lib/ways.rlo")
+    pages.send("break", line=4, on=True)
+    pages.send("go", step="continue")
+    pages.wait(6.0)
+    run = pages.state()["run"]
+    assert (run["reason"], run["lines"][0]["line"], run["lines"][0]["place"]) == ("breakpoint", 4, "4")
+    np.testing.assert_allclose(pages.tool[:3, 3], (0.45, 0.1, 0.3), atol=1e-6)
+    pages.send("stop")
+    (folder.parent / "ways.rlo").write_text(MODULE)
+    (folder / "out.rlo").symlink_to(folder.parent / "ways.rlo")
+    for path in ("../ways.rlo", "out.rlo", str(folder.parent / "ways.rlo")):
+        pages.send("text", text=text.replace("lib/ways.rlo", path), version=pages.state()["program"]["version"])
+        assert pages.state()["program"]["diagnostics"][0]["code"] == "E228"
+    assert pages.studio.project.program.text.endswith("MOVE ARM_1 TO way.low ;\nEND.\n")
+    pages.send("text", text=text, version=pages.state()["program"]["version"])
+    assert pages.send("touch up", line=4) == ""
+    assert pages.studio.project.program.goal_in(4) == "LOW"
+
+
 def without_names(folder: Path) -> Pages:
     """A studio whose cell file and program have no names yet."""
     pages = Pages(folder, program="")

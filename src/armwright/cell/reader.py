@@ -121,7 +121,7 @@ def _cell(top: Table, path: Path, *, arms_needed: bool) -> Cell:
         alarms=read_alarms(top.table("limits")),
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_MAX_DURATION),
         devices=devices,
-        inputs=read_inputs(top.table("inputs"), devices),
+        inputs=read_inputs(top.table("inputs"), devices, arms, _still(standing, frames, moves)),
         contact=ContactPlane(
             height=_optional_number(contact, "z"),
             stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
@@ -345,6 +345,13 @@ def _standing(frames: Mapping[str, Node], arms: Iterable[str]) -> FrameTree:
         name: it for name, it in frames.items() if frames[_path_to_root(name, frames, depth)[-1]].parent not in moving
     }
     return FrameTree({"STATION": Node(parent=WORLD, relation=np.eye(4)), **standing})
+
+
+def _still(standing: FrameTree, frames: Mapping[str, Node], moves: Collection[str]) -> FrameTree:
+    """Return the frames that neither move with an arm nor by themselves."""
+    depth = limit("hanging")
+    moving = {name for name in frames if any(below in moves for below in _path_to_root(name, frames, depth))}
+    return FrameTree({name: node for name, node in standing.nodes.items() if name not in moving})
 
 
 def _path_to_root(name: str, frames: Mapping[str, Node], max_depth: int) -> list[str]:

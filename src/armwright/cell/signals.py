@@ -9,6 +9,7 @@ from typing import TypeAlias
 import attrs
 
 from armwright.cell.outputs import Output
+from armwright.cell.zones import Zone
 
 # A change so little behind the time that is asked for has happened [s].
 _SAME_TIME = 1e-9
@@ -29,6 +30,7 @@ class Input:
         delay: how much later it does so [s].
         event: the EVENT of the program whose SIGNAL switches it on; None for none.
         pulse: how long it is on then [s]; None for ever.
+        zone: where the tool of an arm switches it; None for nowhere.
         address: of the real controller; None where it is not known.
     """
 
@@ -39,6 +41,7 @@ class Input:
     delay: float = 0.0
     event: str | None = None
     pulse: float | None = None
+    zone: Zone | None = None
     address: Output | None = None
 
 
@@ -58,12 +61,14 @@ class Signals:
         # When events were signalled, and what switches were set to by hand.
         self._events: dict[str, Changes] = {}
         self._switches: dict[str, Changes] = {}
+        # What zones have told, and will tell as far as motions are known.
+        self._zones: dict[str, Changes] = {}
 
     def copy(self) -> "Signals":
         """Return signals in the same state; later commands to one do not change the other."""
         other = Signals(self._inputs)
         other.now, other._outputs = self.now, dict(self._outputs)
-        other._events, other._switches = dict(self._events), dict(self._switches)
+        other._events, other._switches, other._zones = dict(self._events), dict(self._switches), dict(self._zones)
         return other
 
     # ---- outputs ---------------------------------------------------------------------------------------------------
@@ -99,10 +104,16 @@ class Signals:
         before = tuple(change for change in self._switches.get(name, ()) if change[0] < when - _SAME_TIME)
         self._switches[name] = (*before, (when, value))
 
+    def note_zone(self, name: str, changes: Changes) -> None:
+        """Take note of what a zone tells from the first of some changes on, in place of what was to come then."""
+        before = tuple(change for change in self._zones.get(name, ()) if change[0] < changes[0][0] - _SAME_TIME)
+        goes_on = bool(before) and before[-1][1] == changes[0][1]
+        self._zones[name] = (*before, *changes[goes_on:])
+
     def input(self, name: str, time: float | None = None) -> float:
-        """Return what an input is now, or at a time: what came last of its timeline, output, event and switch."""
+        """Return what an input is now, or at a time: what came last of what gives it values, and its switch."""
         source, now = self._inputs[name], self.now if time is None else time
-        changes = [latest_change(source.timeline, now)]
+        changes = [latest_change(source.timeline, now), latest_change(self._zones.get(name, ()), now)]
         if source.follows is not None and (
             repeated := latest_change(self._outputs.get(source.follows, ()), now - source.delay)
         ):

@@ -2,23 +2,33 @@
 
 from collections.abc import Collection
 
-from armwright.cell.entries import known_name, read_name, refuse_too_many
+import numpy as np
+
+from armwright.cell.entries import known_name, read_name, read_pose, refuse_too_many
+from armwright.cell.frames import WORLD, FrameTree
 from armwright.cell.outputs_reader import read_address
 from armwright.cell.signals import Changes, Input
+from armwright.cell.zones import Zone
 from armwright.files.document import Table
 
 # Times that are longer are in another unit [s]; numbers that are larger are a slip.
 _MAX_TIME, _MAX_VALUE = 1e6, 1e9
+# Longer sides of zones are in another unit [mm].
+_MAX_LENGTH = 1e6
 # Changes of one input.
 _MAX_CHANGES = 10_000
 
 
-def read_inputs(table: Table, devices: Collection[str] | None) -> dict[str, Input]:
+def read_inputs(
+    table: Table, devices: Collection[str] | None, arms: Collection[str], standing: FrameTree
+) -> dict[str, Input]:
     """Read the inputs of a cell.
 
     Args:
         table: an empty one where the file has none.
         devices: names of its devices; None where any name will do.
+        arms: their names.
+        standing: the frames that do not move.
 
     Raises:
         FileFormatError: a key is unknown or out of range, or an input follows a device that does not exist.
@@ -26,12 +36,22 @@ def read_inputs(table: Table, devices: Collection[str] | None) -> dict[str, Inpu
     refuse_too_many(table, "entries")
     inputs: dict[str, Input] = {}
     for key in table:
-        inputs[read_name(table, key, {*inputs, *(devices or ())})] = _read_input(table.table(key), devices)
+        inputs[read_name(table, key, {*inputs, *(devices or ())})] = _read_input(
+            table.table(key), devices, arms, standing
+        )
     return inputs
 
 
-def _read_input(table: Table, devices: Collection[str] | None) -> Input:
+def _read_input(table: Table, devices: Collection[str] | None, arms: Collection[str], standing: FrameTree) -> Input:
     analogue = table.flag("analogue")
+    if "zone" in table:
+        for key in ("analogue", "start", "timeline", "follows", "event"):
+            if key in table:
+                raise table.error(key, "an input with a zone is on and off by that alone; write two inputs")
+        zone = _read_zone(table.table("zone"), arms, standing)
+        source = Input(zone=zone, address=read_address(table, "input"))
+        table.refuse_unknown_keys()
+        return source
     largest = _MAX_VALUE if analogue else 1.0
     follows = event = None
     if "follows" in table:
@@ -55,9 +75,33 @@ def _read_input(table: Table, devices: Collection[str] | None) -> Input:
         raise table.error("delay_s", "a delay needs the device that the input follows, `follows`")
     if event is None and source.pulse is not None:
         raise table.error("pulse_s", "a pulse needs the EVENT that begins it, `event`")
-    table.allow("follows", "delay_s", "event", "pulse_s", "timeline")
+    table.allow("follows", "delay_s", "event", "pulse_s", "timeline", "zone")
     table.refuse_unknown_keys()
     return source
+
+
+def _read_zone(table: Table, arms: Collection[str], standing: FrameTree) -> Zone:
+    """Read where the tool of an arm switches an input."""
+    arm = known_name(table, "arm", table.text("arm", default=next(iter(arms), "ARM_1")), arms, "an arm")
+    frame = known_name(table, "on", table.text("on", default=WORLD), {WORLD, *standing}, "a standing frame")
+    is_ball = "within_mm" in table
+    if is_ball == ("box_mm" in table):
+        raise table.error(
+            "box_mm" if is_ball else None, "expected either within_mm, a distance, or box_mm, three sides"
+        )
+    sides = None if is_ball else table.vector("box_mm", 3) * 1e-3
+    if sides is not None and not ((sides > 0) & (sides <= _MAX_LENGTH * 1e-3)).all():
+        raise table.error("box_mm", f"expected three sides above 0 and up to {_MAX_LENGTH:g} mm")
+    zone = Zone(
+        arm=arm,
+        pose=standing.world(frame) @ read_pose(table, "at", default=np.eye(4)),
+        radius=table.number("within_mm", lower=1e-3, upper=_MAX_LENGTH) * 1e-3 if is_ball else None,
+        sides=sides,
+        inverted=table.flag("inverted"),
+    )
+    table.allow("within_mm", "box_mm")
+    table.refuse_unknown_keys()
+    return zone
 
 
 def _read_timeline(table: Table, largest: float, *, analogue: bool) -> Changes:

@@ -74,14 +74,15 @@ class Simulator:
     long as the arm is in it. So does what stands in a cell without such a plane, in motions that a force may end.
     """
 
-    def __init__(self, cell: Cell, scene: SceneContacts | None = None) -> None:
+    def __init__(self, cell: Cell, scene: SceneContacts | None = None, *, follows_plans: bool = True) -> None:
         """Set up the initial state of the cell.
 
         Args:
             cell: the cell.
             scene: what stands in it, where a tool is to press on that.
+            follows_plans: whether arms are where they are sent to; otherwise zones are told by ``note_tool``.
         """
-        self._cell, self._scene = cell, scene
+        self._cell, self._scene, self._follows_plans = cell, scene, follows_plans
         self._courses: dict[str, ContactCourse] = {}
         self._motions = {name: _Motion(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
         self._signals = Signals(cell.inputs)
@@ -89,10 +90,12 @@ class Simulator:
         self._parts = PartPoses(cell)
         # Wrenches that the sensors of forces take for zero.
         self._zeros: dict[str, Array] = {}
+        for name, motion in self._motions.items():
+            self._note_zones(name, motion.trajectory, 0.0)
 
     def copy(self) -> "Simulator":
         """Return a simulator in the same state; later commands to one do not change the other."""
-        other = Simulator(self._cell, self._scene)
+        other = Simulator(self._cell, self._scene, follows_plans=self._follows_plans)
         other._courses = dict(self._courses)
         other._motions, other._signals = dict(self._motions), self._signals.copy()
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
@@ -129,6 +132,27 @@ class Simulator:
         points = self._contact_points(arm, trajectory, tip, pressed)
         self._motions[arm] = _Motion(t0=now, trajectory=trajectory, points=points)
         self._press_on_scene(arm, now, trajectory, guarded=guarded)
+        if self._follows_plans:
+            self._note_zones(arm, trajectory, now)
+
+    def _ticks(self, trajectory: Trajectory) -> Array:
+        """Return the times of the servo ticks of a trajectory [s]."""
+        ticks = np.arange(round(trajectory.duration / self._cell.period) + 1)
+        return np.asarray(np.minimum(ticks * self._cell.period, trajectory.duration))
+
+    def _note_zones(self, arm: str, trajectory: Trajectory, start: float) -> None:
+        """Let the zones of an arm know the trajectory that it follows from a time on."""
+        if any(source.zone is not None and source.zone.arm == arm for source in self._cell.inputs.values()):
+            known = self._cell.arms[arm]
+            times = _split_blocks(self._ticks(trajectory))
+            blocks = (known.base @ forward(known.arm, trajectory(block)) for block in times)
+            self.note_tool(arm, np.concatenate([poses[:, :3, 3] for poses in blocks]), start)
+
+    def note_tool(self, arm: str, p: Array, start: float) -> None:
+        """Let the zones of an arm know positions (k, 3) of its tool in the world at the servo ticks from a time on."""
+        for name, source in self._cell.inputs.items():
+            if source.zone is not None and source.zone.arm == arm:
+                self._signals.note_zone(name, source.zone.changes(p, start, self._cell.period))
 
     def _press_on_scene(self, arm: str, now: float, trajectory: Trajectory, *, guarded: bool) -> None:
         """See what a tool presses on from now on; without a guard only what it presses on already counts."""
@@ -241,8 +265,7 @@ class Simulator:
         plane = self._cell.contact.height
         if plane is None:
             return ()
-        ticks = np.arange(round(trajectory.duration / self._cell.period) + 1)
-        t = np.minimum(ticks * self._cell.period, trajectory.duration)
+        t = self._ticks(trajectory)
         others = [pose for pose in pressed if not np.allclose(pose, tip, rtol=0, atol=_DEPTH_TOLERANCE)]
         points = []
         for pose, is_pressed in ((tip, len(others) < len(pressed)), *((other, True) for other in others)):

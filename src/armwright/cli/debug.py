@@ -10,11 +10,13 @@ from armwright.cli.options import usage_error
 from armwright.cli.programs import (
     CellFile,
     Physics,
+    ProgramArguments,
     Seed,
     Std,
     Strict,
     hardware_factory,
     print_diagnostics,
+    read_arguments,
     read_cell_option,
 )
 from armwright.program.language.words import Standard
@@ -30,6 +32,7 @@ def debug(  # noqa: PLR0917 - Typer reads one parameter per option
         Path | None, Argument(help="The program; without it, an editor is served over standard input and output.")
     ] = None,
     cell: CellFile = None,
+    arg: ProgramArguments = None,
     physics: Physics = False,
     seed: Seed = 0,
     std: Std = Standard.RLO_2,
@@ -39,13 +42,14 @@ def debug(  # noqa: PLR0917 - Typer reads one parameter per option
 
     With a program, the debugger runs on the terminal; `help` lists its commands. Without a program, it serves an editor
     by the Debug Adapter Protocol over standard input and output; the editor's launch configuration has the keys
-    program, cell, physics, seed, std, strict, stopOnEntry and output.
+    program, cell, arguments, physics, seed, std, strict, stopOnEntry and output.
 
     **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
     """
     if program is None:
-        if cell is not None:
-            raise usage_error("--cell", "expected a program; an editor names the cell in its launch configuration")
+        for option, value in (("--cell", cell), ("--arg", arg)):
+            if value:
+                raise usage_error(option, "expected a program; an editor has this in its launch configuration")
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal
@@ -62,6 +66,7 @@ def debug(  # noqa: PLR0917 - Typer reads one parameter per option
         strict=strict,
         physics=physics,
         seed=seed,
+        arguments=read_arguments(arg),
     )
     try:
         loaded = load(launch)
@@ -95,6 +100,8 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
     Raises:
         ProgramError: the program has errors.
         MissingCellError: the program has no cell to run in.
+        UnknownNameError: an argument is for no constant of the program.
+        InvalidValueError: an argument is not of the type of its constant.
         FileFormatError: a file cannot be read.
     """
     import attrs
@@ -109,7 +116,7 @@ def load(launch: "LaunchRequest") -> "LoadedProgram":
     if cell is None and not is_code_file:
         nearby = CellCache().find_cell(path.parent, read_program(path), None)
         cell = None if nearby is None else nearby.cell
-    loaded = api.load(path, cell, strict=launch.strict, std=launch.std)
+    loaded = api.load(path, cell, strict=launch.strict, std=launch.std, arguments=launch.arguments)
     if loaded.cell is None:
         reason = "" if is_code_file else ": it IMPORTs none, and its folder does not have exactly one"
         raise MissingCellError(f"{path.name} needs a cell to run in{reason}")
@@ -131,7 +138,11 @@ def save(launch: "LaunchRequest", loaded: "LoadedProgram", recording: "Recording
         cell=launch.cell,
         imports=loaded.imports,
         command="armwright debug",
-        options={"std": launch.std.value, "strict": launch.strict},
+        options={
+            "std": launch.std.value,
+            "strict": launch.strict,
+            **({"arguments": dict(launch.arguments)} if launch.arguments else {}),
+        },
     )
     write_run(launch.output, recording, (*loaded.diagnostics, *run_diagnostics(recording)), origin)
     return f"report{' up to the failure' if recording.failure else ''}: {launch.output / 'report.html'}"

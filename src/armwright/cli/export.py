@@ -9,7 +9,16 @@ from typer import Argument, Option
 
 from armwright.cli.options import Json, QuietButWarnings, usage_error
 from armwright.cli.output import print_json
-from armwright.cli.programs import CellFile, ProgramFile, Std, Strict, load_program, print_diagnostics
+from armwright.cli.programs import (
+    CellFile,
+    ProgramArguments,
+    ProgramFile,
+    Std,
+    Strict,
+    load_program,
+    print_diagnostics,
+    read_arguments,
+)
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.export.targets import Mode, Target
 from armwright.program.language.words import Standard
@@ -34,6 +43,7 @@ def export(  # noqa: PLR0917 - Typer reads one parameter per option
         ),
     ] = None,
     output: Annotated[Path | None, Option("-o", "--output", help="Folder for the files of the controller.")] = None,
+    arg: ProgramArguments = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     as_json: Json = False,
@@ -55,7 +65,8 @@ def export(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.program.vm.machine import RunError
 
     warn_of_stray(program)
-    loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json)
+    arguments = read_arguments(arg)
+    loaded = load_program(program, cell, strict=strict, std=std, as_json=as_json, arguments=arguments)
     if loaded.cell is None:
         raise usage_error("--cell", f"missing: {program} needs a cell to run in, and IMPORTs none")
     try:

@@ -140,7 +140,9 @@ def export_compiled(target: Target, compiled: Compilation, recording: Recording,
     written = writer.write(code)
     wanted = expected(code, recording)
     try:
-        done = machine.run([*written.files.values()], CellWorld(recording.cell, wanted.ends))
+        configurations = {stream.arm: stream.q for stream in recording.streams}
+        world = CellWorld(recording.cell, wanted.ends, configurations)
+        done = machine.run([*written.files.values()], world)
     except CheckError as error:
         raise CheckFailedError(f"the exported program cannot be run: {error}") from error
     proof = Proof(

@@ -82,7 +82,8 @@ class PhysicsCell:
         for sight in cell.sights.values():
             if sight.camera is not None:
                 target_of(cell, sight)
-        self._cell, self._believed = cell, Simulator(cell)
+        self._cell, self._believed = cell, Simulator(cell, follows_plans=False)
+        self._zone_arms = {source.zone.arm for source in cell.inputs.values() if source.zone is not None}
         self._seed, self._rng = seed, np.random.default_rng(seed)
         parts = drawn_parts(cell, self._rng) if parts is None else parts
         self._frames = drawn_frames(cell, self._rng) if frames is None else frames
@@ -192,6 +193,11 @@ class PhysicsCell:
         # A step leaves the poses of its beginning.
         self._log.add_parts(self._tick, data)
         self._tick += 1
+        for name in self._zone_arms:
+            arm = self._cell.arms[name]
+            q = data.qpos[self._servos[name].indices.positions]
+            tool = arm.base @ forward(arm.plant or arm.arm, q)
+            self._believed.note_tool(name, tool[None, :3, 3], self.now)
         return None
 
     # ---- arms ----------------------------------------------------------------------------------------------------

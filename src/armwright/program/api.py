@@ -28,7 +28,8 @@ from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.modules.files import ParsedFile, parse_file, read_files
 from armwright.program.modules.linking import LinkedProgram, check_module, link
 from armwright.program.modules.names import declared_names
-from armwright.program.records.layout import RecordVariable, lay_out
+from armwright.program.records.layout import RecordType, RecordVariable, lay_out
+from armwright.program.records.messages import in_terms_of_records
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
 from armwright.program.semantics.cell_symbols import (
@@ -73,7 +74,9 @@ class Compilation:
             one field.
         spelling: how the names of the whole are written, by their keys.
         brought: the names that modules give, as this file may write them, with their keys in the whole.
+        names: of each file, by its number, its names that have other keys in the whole.
         records: the variables that are records, by key: of the program, under the empty text, and of each procedure.
+        record_types: their types, and those that no variable has, by key.
     """
 
     source: Source
@@ -92,7 +95,9 @@ class Compilation:
     whole: Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
     spelling: Mapping[str, str] = attrs.field(factory=dict)
     brought: Mapping[str, str] = attrs.field(factory=dict)
+    names: Mapping[int, Mapping[str, str]] = attrs.field(factory=dict)
     records: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
+    record_types: Mapping[str, RecordType] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -428,12 +433,14 @@ def _check_names(
         tree=main.tree,
         whole=laid_out.tree,
         records=laid_out.variables,
+        record_types=laid_out.types,
         brought=linked.brought,
+        names=linked.names,
         spelling=_name_spellings((main,) if files is None else files.files.values(), laid_out.tree),
         symbols=symbols,
         imports=imports,
         flow=None,
-        diagnostics=sort_diagnostics(diagnostics),
+        diagnostics=sort_diagnostics(in_terms_of_records(diagnostics, laid_out.variables)),
         code=None,
         cell=add_imported_frames(cell, imports) if isinstance(cell, Cell) else None,
         cell_symbols=cell_symbols,
@@ -453,6 +460,7 @@ def analyse_flow(compiled: Compilation) -> Compilation:
         flow, diagnostics = analysis.check(
             compiled.whole, compiled.symbols, compiled.spelling, cell_symbols, strict=strict, source=source
         )
+    diagnostics = in_terms_of_records(diagnostics, compiled.records)
     return attrs.evolve(compiled, flow=flow, diagnostics=sort_diagnostics((*compiled.diagnostics, *diagnostics)))
 
 
@@ -461,14 +469,30 @@ def _generate_code(compiled: Compilation) -> Compilation:
     if compiled.flow is None or any(diagnostic.is_error for diagnostic in compiled.diagnostics):
         return compiled
     code = generate(compiled.source, compiled.whole, compiled.symbols, compiled.flow, compiled.spelling)
-    return attrs.evolve(compiled, code=attrs.evolve(code, standard=compiled.standard))
+    records = {
+        procedure: {key: variable.type.name.text for key, variable in own.items()}
+        for procedure, own in compiled.records.items()
+    }
+    procedures = {
+        key: attrs.evolve(procedure, records=records.get(key, {})) for key, procedure in code.procedures.items()
+    }
+    code = attrs.evolve(
+        code,
+        standard=compiled.standard,
+        procedures=procedures,
+        records=records.get("", {}),
+        names=compiled.names,
+    )
+    return attrs.evolve(compiled, code=code)
 
 
 def _name_spellings(files: Iterable[ParsedFile], whole: Program) -> dict[str, str]:
     """Return how a program first writes each of its names, its own file before those of its modules."""
     tokens = [token for file in files for token in reversed(file.tokens) if token.kind is TokenKind.NAME]
     spelling = {token.key: token.text for token in tokens}
-    qualified = (name for name in declared_names(whole).values() if "." in name.key and name.key not in spelling)
+    own = (declaration for node in whole.procedures for declaration in (*node.parameters, *node.declarations))
+    names = (*declared_names(whole).values(), *(name for declaration in own for name in declaration.names))
+    qualified = (name for name in names if "." in name.key and name.key not in spelling)
     return spelling | {name.key: _spelled(name) for name in qualified}
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES
+from armwright.program.language_server.highlight import CONTEXT_PATTERNS, DECLARATIONS, KEYWORDS, OPERATORS, TYPES
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.report.animation import Animation, FrameTrack, MovedPart
 from armwright.report.arm_figure import arm_figure
@@ -121,4 +121,5 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
             "keyword": sorted(KEYWORDS | OPERATORS),
             "function": sorted(FUNCTIONS),
         },
+        "context": CONTEXT_PATTERNS,
     }

@@ -23,6 +23,7 @@ from armwright.physics.world import PhysicsCell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.debugger import Command, Debugger
 from armwright.program.debugger.stop_reason import Stop
+from armwright.program.language.source import Source, Span
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.recording import Recording
 from armwright.studio.shown_effects import ShownEffects
@@ -274,14 +275,14 @@ class ProgramRun:
             return ()
         # A process that waits for its branches is in no line.
         waits = [it for it in debugger.processes if it.waiting is None or it.waiting.kind != "branches"]
-        stands = [(process, debugger.stack(process.path)[0]) for process in waits]
+        stacks = [(process, debugger.stack(process.path)) for process in waits]
         return tuple(
             {
-                "process": frame.title,
+                "process": stack[0].title,
                 "arm": None if process.motion is None else process.motion.arm,
-                "line": source.line(frame.span.start),
+                **_place(source, stack[0].span, *(frame.span for frame in stack[1:])),
             }
-            for process, frame in stands
+            for process, stack in stacks
         )
 
     def _variables(self, stop: Stop) -> tuple[dict[str, str], ...]:
@@ -390,7 +391,7 @@ class ProgramRun:
         # A process that waits for others, as for its branches, is in no line.
         busy = [it for it in latest.values() if it.t1 >= self.time - _SAME]
         shown = busy or [max(latest.values(), key=lambda it: it.order)] if latest else []
-        return [{"process": it.process, "arm": it.arm, "line": source.line(it.span.start)} for it in shown]
+        return [{"process": it.process, "arm": it.arm, **_place(source, it.span)} for it in shown]
 
     def state(self) -> dict[str, Any]:
         """Return what a page shows of the run, as plain data."""
@@ -412,7 +413,7 @@ class ProgramRun:
         """Return the latest of what has happened, as plain data."""
         source = self._computed.machine.code.source
         return [
-            {"t": round(effect.t0, 4), "line": source.line(effect.span.start), "text": effect.text}
+            {"t": round(effect.t0, 4), "line": source.place(effect.span.start), "text": effect.text}
             for effect in self.happened.begun[-_TRACE:]
         ]
 
@@ -433,3 +434,17 @@ class ProgramRun:
         if stop is not None and stop.recording is not None:
             return stop.recording()
         return self._debugger.view.recording()
+
+
+def _place(source: Source, *spans: Span) -> dict[str, Any]:
+    """Return where something is, as plain data.
+
+    Args:
+        source: the program, of which a page shows the own file.
+        spans: of what is done, and of the calls that led to it, the innermost first.
+
+    Returns:
+        The line of the own file, 0 where nothing of all that is in it; and the line and file of the first.
+    """
+    own = next((source.line(span.start) for span in spans if not source.file_number(span.start)), 0)
+    return {"line": own, "place": source.place(spans[0].start)}

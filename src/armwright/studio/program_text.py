@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from armwright.cell.model import Cell
-from armwright.errors import ArmwrightError, InvalidValueError
+from armwright.errors import ArmwrightError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_program
 from armwright.files.output import write_back
 from armwright.program.api import Compilation, compile as compile_program, import_reader
 from armwright.program.flow_analysis.side_effects import walk_statements
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.language.names import is_module
 from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCodec, column_count
 from armwright.program.language.source import Source
-from armwright.program.semantics.cell_symbols import ImportedFrames, ImportedModule
 from armwright.program.syntax.nodes import ArmName, Name
 from armwright.program.syntax.tree import Blend, Circularly, Directly, Move, Straightly, Via, clause_word
 
@@ -33,13 +30,6 @@ _LONGEST = 500_000
 _MOST_DIAGNOSTICS = 200
 # Completions that it gets.
 _MOST_COMPLETIONS = 60
-
-
-def _read_import(folder: Path, name: str) -> ImportedFrames | ImportedModule:
-    """Read what an IMPORT of a program in a folder names; modules have texts that the studio does not show."""
-    if is_module(name):
-        raise InvalidValueError("the studio shows programs of one file; `armwright run` runs those with modules")
-    return import_reader(folder)(name)
 
 
 class ProgramTextError(ArmwrightError, ValueError):
@@ -132,7 +122,7 @@ class ProgramText:
 
     def _take(self, compiled: Compilation) -> None:
         """Take another text that has been compiled."""
-        self.text, self.version = compiled.source.text, self.version + 1
+        self.text, self.version = compiled.source.main.text, self.version + 1
         self._take_compiled(compiled)
 
     def _take_compiled(self, compiled: Compilation) -> None:
@@ -141,8 +131,16 @@ class ProgramText:
         self._diagnostics = [self._diagnostic_state(it) for it in self.compiled.diagnostics[:_MOST_DIAGNOSTICS]]
 
     def _compiled(self, text: str) -> Compilation:
-        read_import = None if self.path is None else partial(_read_import, self.path.parent)
+        read_import = None if self.path is None else import_reader(self.path.parent)
         return compile_program(Source(self.name, text), self._cell, read_import=read_import)
+
+    def read_modules(self) -> None:
+        """Read the modules that it IMPORTs again: they count as they are in their files now."""
+        if self.compiled.source.modules or self._lacks_files():
+            self._take_compiled(self._compiled(self.text))
+
+    def _lacks_files(self) -> bool:
+        return any(it.code == "E228" for it in self.compiled.diagnostics)
 
     def completions(self, text: str, offset: int) -> list[dict[str, Any]]:
         """Return what can be written at a position, the likeliest first, as plain data.
@@ -347,7 +345,7 @@ class ProgramText:
         goal = self._move_in(line).goal
         if not isinstance(goal, Name):
             raise ProgramTextError(f"the MOVE in line {line} goes to an expression, which has no pose to touch up")
-        return goal.text
+        return self.compiled.names.get(0, {}).get(goal.key, goal.text)
 
     def moved_in(self, line: int) -> str:
         """Return the arm that the MOVE in a line moves.
@@ -414,17 +412,22 @@ class ProgramText:
         }
 
     def _diagnostic_state(self, it: Diagnostic) -> dict[str, Any]:
+        source = self.compiled.source
+        if source.file_number(it.span.start):
+            # A page has the text of the program alone, and cannot change that of a module.
+            place: dict[str, Any] = {"start": None, "end": None, "file": source.name_at(it.span.start)}
+        else:
+            place = {"start": self._column(it.span.start), "end": self._column(it.span.end), "file": ""}
         return {
-            "start": self._column(it.span.start),
-            "end": self._column(it.span.end),
-            "line": self.compiled.source.line(it.span.start),
+            **place,
+            "line": source.line(it.span.start),
             "severity": it.severity.value,
             "code": it.code,
             "text": it.message,
             "helps": list(it.helps),
             "fixes": [
                 {"start": self._column(fix.span.start), "end": self._column(fix.span.end), "text": fix.replacement}
-                for fix in it.fixes
+                for fix in (it.fixes if not place["file"] else ())
             ],
         }
 

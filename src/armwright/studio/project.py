@@ -227,13 +227,14 @@ class Project:
         Raises:
             ProgramTextError: it has errors.
         """
+        self.program.read_modules()
         compiled, cell = self.program.compiled, self.workbench.cell
         if line:
             compiled, cell = self.program.part_from(line, only=only), self.workbench.cell_as_shown()
         cell = add_imported_frames(cell, compiled.imports) or cell
         if compiled.code is None:
             error = first_error(compiled)
-            where = compiled.source.line(error.span.start)
+            where = compiled.source.place(error.span.start)
             raise ProgramTextError(f"line {where}: {error.code}: {error.message}")
         kind: HardwareFactory = PhysicsCell if physics else kinematic_cell
 

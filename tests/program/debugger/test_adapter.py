@@ -314,6 +314,19 @@ def test_language_and_strictness_of_a_launch(client: Client, written: Any) -> No
     client.ask("launch", program=str(program), std="83", stopOnEntry=True)
 
 
+def test_arguments_of_a_launch(client: Client, written: Any) -> None:
+    """A launch gives constants other values, of their types."""
+    program = written(
+        'CONST pitch = 25 ; title = "tray" ; VAR n : SCALAR ;\nBEGIN\n  n = 2 * pitch ; PRINT(title, n)\nEND.\n'
+    )
+    assert "expected a number" in client.refused("launch", program=str(program), arguments={"pitch": [1]})
+    client.launch(program, lines=(3,), arguments={"PITCH": 20, "title": "box"})
+    client.wait("stopped")
+
+    assert client.ask("evaluate", expression="title")["result"] == '"box"'
+    assert client.ask("evaluate", expression="2 * pitch")["result"] == "40"
+
+
 def test_arrays_come_in_pieces(client: Client, written: Any) -> None:
     """Of a large array an editor can ask for some elements."""
     program = written("VAR a : ARRAY [100,100] OF SCALAR ;\nBEGIN\n  a[3,7] = 5 ;\n  PRINT(a[3,7])\nEND.\n")

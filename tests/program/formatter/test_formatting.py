@@ -497,6 +497,16 @@ def test_wrong_programs() -> None:
         layout("BEGIN FOR i = 1 TO 2 DO HALT END.", Standard.RLO_83)
 
 
+def test_programs_with_other_errors() -> None:
+    """What is wrong with names and types does not keep a program from being laid out: every word stays."""
+    long = "a" * 40
+    types = "VAR f:thing;g:FRMAE;BEGIN END."
+    assert check_kept(types) == "VAR f : thing ;\n    g : FRMAE ;\nBEGIN\nEND.\n"
+    assert layout(types, Standard.RLO_83) == layout(types)
+    assert layout(f"VAR {long}:SCALAR;BEGIN {long}=1 END.") == (f"VAR {long} : SCALAR ;\nBEGIN\n  {long} = 1\nEND.\n")
+    assert layout("VAR n:SCALAR;module m;BEGIN n=1 END.") == ("VAR n : SCALAR ;\nMODULE m ;\nBEGIN\n  n = 1\nEND.\n")
+
+
 @pytest.mark.parametrize("option", ["numbers", "width"])
 def test_senseless_options(option: str) -> None:
     """Numbers and widths count from 1."""

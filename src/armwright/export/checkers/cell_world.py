@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 
+from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.outputs import Output
 from armwright.cell.signals import Signals
 from armwright.export.checkers.actions import Action, OutputAction, PulseAction
+from armwright.kinematics.forward_kinematics import forward
 
 
 class CellWorld:
@@ -15,16 +17,22 @@ class CellWorld:
         step: the servo period of the cell [s].
     """
 
-    def __init__(self, cell: Cell, ends: tuple[float, ...]) -> None:
+    def __init__(self, cell: Cell, ends: tuple[float, ...], configurations: Mapping[str, Array] | None = None) -> None:
         """Begin at time zero.
 
         Args:
             cell: of the run.
             ends: when each thing was over that the program did, texts left out [s].
+            configurations: by arm, (k, n) at the servo ticks of the run, which zones of the cell look at.
         """
         self.step = cell.period
         self._ends, self._count = ends, 0
         self._signals = Signals(cell.inputs)
+        for name, source in cell.inputs.items():
+            if source.zone is not None and source.zone.arm in (configurations or {}):
+                arm, q = cell.arms[source.zone.arm], (configurations or {})[source.zone.arm]
+                tools = arm.base @ forward(arm.arm, q)
+                self._signals.note_zone(name, source.zone.changes(tools[:, :3, 3], 0.0, cell.period))
         addressed = {name: source.address for name, source in cell.inputs.items()}
         self._inputs = _names(addressed)
         self._outputs = _names({name: device.output for name, device in (cell.devices or {}).items()})

@@ -59,8 +59,11 @@ def _lines(code: Code) -> Iterator[str]:
     if code.standard is not Standard.RLO_2:
         yield f"standard {code.standard.value}"
     yield from (f"name {text}" for text in code.spelling.values())
+    for file, names in code.names.items():
+        yield from (f"sees {file} {written} {name}" for written, name in names.items())
     for name, kind in code.types.items():
         yield f"var {name} {kind}"
+    yield from (f"record {name} {kind}" for name, kind in code.records.items())
     for name, procedure in code.procedures.items():
         result = "" if procedure.result is None else f" {procedure.result}"
         yield f"procedure {name} {JumpTarget(procedure.start)}{result}"
@@ -68,6 +71,7 @@ def _lines(code: Code) -> Iterator[str]:
             word = "parameter" if own in procedure.parameters else "local"
             word = "inout" if own in procedure.inout else word
             yield f"  {word} {own} {kind}"
+        yield from (f"  record {own} {record}" for own, record in procedure.records.items())
     for index, value in enumerate(code.constants):
         numbers = value if isinstance(value, tuple) else (value,)
         yield f"constant {Constant(index)} {' '.join(map(repr, numbers))}"
@@ -110,6 +114,9 @@ class _Reader:
         self._file, self._rows, self._number = file, text.split("\n"), 0
         self._program, self._units, self._standard = "program", UnitSystem(), Standard.RLO_2
         self._spelling: dict[str, str] = {}
+        self._seen_names: dict[int, dict[str, str]] = {}
+        # Those of the procedure that is read, or of the program in front of all procedures.
+        self._records = self._program_records = dict[str, str]()
         self._types: dict[str, VariableType] = {}
         self._procedures: dict[str, ProcedureCode] = {}
         # Those of the last procedure.
@@ -128,6 +135,8 @@ class _Reader:
             "standard": self._read_standard,
             "name": lambda rest: self._spelling.update({self._name(rest): rest}),
             "var": lambda rest: self._types.update([self._declaration(rest)]),
+            "sees": self._read_seen_name,
+            "record": self._read_record,
             "procedure": self._read_procedure,
             "parameter": self._read_parameter,
             "inout": self._read_inout,
@@ -199,14 +208,30 @@ class _Reader:
             self._fail(f"unknown standard {rest!r}, expected {' or '.join(known)}")
         self._standard = Standard(rest)
 
+    def _read_seen_name(self, rest: str) -> None:
+        file, *names = rest.split()
+        if len(names) != 2 or not file.isdecimal():
+            self._fail("expected the number of a file, a name and its name in the program")
+        written, name = map(self._name, names)
+        self._seen_names.setdefault(int(file[:9]), {})[written] = name
+
+    def _read_record(self, rest: str) -> None:
+        name, _, kind = rest.partition(" ")
+        self._name(kind)
+        self._records[self._name(name)] = kind
+
     def _read_procedure(self, rest: str) -> None:
         name, _, rest = rest.partition(" ")
         start, _, result = rest.partition(" ")
         if not re.fullmatch(r"@[0-9]{1,9}", start):
             self._fail("expected the first instruction of the procedure, such as @0012")
-        self._own_types = {}
+        self._own_types, self._records = {}, {}
         self._procedures[self._name(name)] = ProcedureCode(
-            start=int(start[1:]), parameters=(), types=self._own_types, result=self._type(result) if result else None
+            start=int(start[1:]),
+            parameters=(),
+            types=self._own_types,
+            result=self._type(result) if result else None,
+            records=self._records,
         )
 
     def _read_parameter(self, rest: str) -> None:
@@ -283,8 +308,16 @@ class _Reader:
             units=self._units,
             spelling=self._spelling,
             standard=self._standard,
+            records=self._program_records,
+            names=self._seen_names,
             source=attrs.evolve(self._text, name=self._program),
         )
+        parts: tuple[Code | ProcedureCode, ...] = (code, *code.procedures.values())
+        for part in parts:
+            for name in part.records:
+                fields = [kind for field, kind in part.types.items() if field.rpartition(".")[0] == name]
+                if not fields or any(kind.sizes != fields[0].sizes for kind in fields):
+                    self._fail(f"expected variables for the fields of the record {name}, all single or all arrays")
         try:
             verify(code)
         except CodeError as error:

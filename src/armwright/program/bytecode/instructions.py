@@ -3,6 +3,7 @@
 import enum
 import json
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Self, TypeAlias
 
 import attrs
@@ -335,6 +336,7 @@ class ProcedureCode:
         types: of parameters and own variables, by name.
         inout: parameters that are other names of the variables given for them, though of a kind passed by value.
         result: of a function, what its value is.
+        records: its records and arrays of records, by name, with their types; their fields are among its ``types``.
     """
 
     start: int
@@ -342,6 +344,7 @@ class ProcedureCode:
     types: Mapping[str, VariableType]
     inout: frozenset[str] = frozenset()
     result: VariableType | None = None
+    records: Mapping[str, str] = attrs.field(factory=dict)
 
 
 @attrs.frozen(kw_only=True)
@@ -356,6 +359,8 @@ class Code:
         units: what numbers count at run time.
         spelling: how the program first writes each canonical name that is not in upper case.
         standard: which RLO it was read as; motion past VIA points is that of the report in RLO-83.
+        records: the records and arrays of records of the program, by name, with their types, as of procedures.
+        names: of each file, by its number, the canonical names of what it writes otherwise: names of its modules.
         source: the program text.
     """
 
@@ -366,6 +371,8 @@ class Code:
     units: UnitSystem = attrs.field(factory=UnitSystem)
     spelling: Mapping[str, str] = attrs.field(factory=dict)
     standard: Standard = Standard.RLO_2
+    records: Mapping[str, str] = attrs.field(factory=dict)
+    names: Mapping[int, Mapping[str, str]] = attrs.field(factory=dict)
     source: Source
 
     def spelled(self, name: str) -> str:
@@ -374,7 +381,20 @@ class Code:
             return self.spelling[name]
         base, bracket, indices = name.partition("[")
         base = base.partition("'")[0]
-        return f"{self.spelling.get(base, base)}{bracket}{indices}"
+        spelled = self.spelling.get(base, base)
+        if bracket and self._is_field(base):
+            record, _, field = spelled.rpartition(".")
+            return f"{record}[{indices}.{field}"
+        return f"{spelled}{bracket}{indices}"
+
+    def _is_field(self, name: str) -> bool:
+        """Whether a name is that of a field of a record."""
+        record = name.rpartition(".")[0]
+        return bool(record) and any(record in own for own in (self.records, *self._procedure_records))
+
+    @cached_property
+    def _procedure_records(self) -> tuple[Mapping[str, str], ...]:
+        return tuple(procedure.records for procedure in self.procedures.values() if procedure.records)
 
     def line(self, instruction: Instruction) -> int:
         """Return the line of the program, from 1, that asks for an instruction."""

@@ -102,6 +102,7 @@ def _launch_request(arguments: Arguments) -> LaunchRequest:
         strict=arguments.get(bool, "strict", default=False),
         physics=arguments.get(bool, "physics", default=False),
         seed=arguments.get(int, "seed", default=0),
+        arguments=arguments.get(dict, "arguments", {}),
     )
 
 

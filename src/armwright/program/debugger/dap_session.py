@@ -20,6 +20,7 @@ from armwright.program.language.diagnostic import summary_line
 from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
+from armwright.program.semantics.arguments import Arguments as ConstantValues
 from armwright.program.vm.excerpt import MAX_TERMINAL_LINES, excerpt, omission_text, shorten_line
 from armwright.program.vm.recording import Effect, Recording
 
@@ -42,6 +43,7 @@ class LaunchRequest:
         strict: whether an AFFIX that is only implied is an error.
         physics: whether the cell is simulated with physics.
         seed: of what is random there.
+        arguments: values for constants of the program, in place of their own.
         output: a folder for what a run leaves; None for none.
         stop_on_entry: whether to stop in front of the first statement.
         no_debug: whether to run without stops.
@@ -56,6 +58,7 @@ class LaunchRequest:
     strict: bool = False
     physics: bool = False
     seed: int = 0
+    arguments: ConstantValues = attrs.field(factory=dict)
 
 
 class MissingCellError(ArmwrightError, ValueError):

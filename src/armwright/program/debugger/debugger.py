@@ -309,6 +309,9 @@ class Debugger:
         if text.strip().upper() == "FRAMES" and "FRAMES" not in visible_names(view, frame.procedure):
             return Variable(name="frames", value="\n".join(variables.frame_tree_lines(view)))
         parsed = expressions.parse_expression(text, view, frame.procedure)
+        if parsed.record:
+            slots = expressions.find_field_slots(view, frame, parsed)
+            return variables.record_variable(view, text, parsed.record, slots)
         slot = expressions.find_slot(view, frame, parsed)
         if slot is not None:
             return attrs.evolve(variables.make_variable(view, slot, name=text), expression=text)

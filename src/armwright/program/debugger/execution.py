@@ -10,13 +10,19 @@ from armwright.cell.hardware import HardwareFactory
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.breakpoints import Breakpoint, Watch, matches_hit_count
-from armwright.program.debugger.expressions import CheckedExpression, ExpressionError, evaluate, parse_expression
+from armwright.program.debugger.expressions import (
+    CheckedExpression,
+    ExpressionError,
+    evaluate,
+    find_field_slots,
+    parse_expression,
+)
 from armwright.program.debugger.history import ProcessPath, Timeline
 from armwright.program.debugger.snapshot import call_stack, find_process, moving_process, view_at
 from armwright.program.debugger.statements import Statements
 from armwright.program.debugger.step_rules import Step
 from armwright.program.debugger.stop_reason import Stop
-from armwright.program.debugger.variables import value_variable
+from armwright.program.debugger.variables import record_variable, value_variable
 from armwright.program.vm.machine import Limits, Machine, RunError
 from armwright.program.vm.process import Process
 
@@ -188,6 +194,9 @@ class Execution:
         def value(match: re.Match[str]) -> str:
             try:
                 parsed = parse_expression(match[1], view, frame.procedure)
+                if parsed.record:
+                    slots = find_field_slots(view, frame, parsed)
+                    return record_variable(view, match[1], parsed.record, slots).value
                 if parsed.type is None:
                     return match[1]
                 return value_variable(view, "", evaluate(view, frame, parsed), "").value

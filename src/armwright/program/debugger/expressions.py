@@ -1,7 +1,7 @@
 """Expressions of the language, worked out in a run that stands still: by its own parser, checker and operations."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import attrs
 
@@ -18,7 +18,8 @@ from armwright.program.semantics.scopes import NameResolver
 from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Scope
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
-from armwright.program.syntax.lexer import TokenKind, scan
+from armwright.program.syntax.lexer import Token, TokenKind, scan
+from armwright.program.syntax.nodes import walk
 from armwright.program.syntax.token_stream import PanicModeError, TokenStream
 from armwright.program.vm.calls import evaluate_instructions
 from armwright.program.vm.machine import Machine, RunError
@@ -36,22 +37,25 @@ class CheckedExpression:
     Attributes:
         source: its text.
         node: what it says.
-        type: what its value is; None for a whole array.
+        type: what its value is; None for a whole array or record.
         scope: the names it was checked with.
+        record: the type of a whole record, or of an array of records; empty for anything else.
     """
 
     source: Source
     node: tree.Expression
     type: ExpressionType | None
     scope: Scope
+    record: str = ""
 
 
 def visible_names(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
     frames = (name for name in machine.state.tree if not name.endswith(".BASE") and not set(name) & set("'["))
     local = {} if procedure is None else machine.code.procedures[procedure].types
-    cell = {name: VariableType(VariableKind.FRAME) for name in frames if name not in machine.cell.arms}
-    return {**cell, **PREDECLARED, **machine.code.types, **local}
+    declared = {**PREDECLARED, **machine.code.types, **local}
+    known = {*declared, *machine.cell.arms}
+    return {**{name: VariableType(VariableKind.FRAME) for name in frames if name not in known}, **declared}
 
 
 def parse_expression(text: str, machine: Machine, procedure: str | None) -> CheckedExpression:
@@ -68,8 +72,7 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
     source, types = Source("expression", text), visible_names(machine, procedure)
     scanned = scan(source, text)
     _raise_errors(scanned.diagnostics)
-    named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
-    tokens = TokenStream(source, named, {})
+    tokens = TokenStream(source, _named(scanned.tokens, types, machine, procedure), {})
     try:
         node = expression(tokens)
     except PanicModeError:
@@ -83,11 +86,73 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
     names.symbols.procedures = _procedures(machine)
     if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
         return CheckedExpression(source=source, node=node, type=None, scope=names.scope)
+    name = node.name if isinstance(node, tree.Index) else node
+    records = visible_records(machine, procedure)
+    if isinstance(name, tree.Name) and name.key in records and name.key not in types:
+        # Of an element the index is checked, with one of its fields.
+        if isinstance(node, tree.Index):
+            type_check.infer_type(names, next(field for _, field in _fields(node, names.scope)))
+            _raise_errors(names.diagnostics)
+        return CheckedExpression(source=source, node=node, type=None, scope=names.scope, record=records[name.key])
+    _require_fields(node, types, machine, procedure)
     sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
         raise ExpressionError(f"`{text}` has no value")
     return CheckedExpression(source=source, node=node, type=sort, scope=names.scope)
+
+
+def visible_records(machine: Machine, procedure: str | None) -> dict[str, str]:
+    """Return the records and arrays of records that can be named, with their types."""
+    local = {} if procedure is None else machine.code.procedures[procedure].records
+    return {**machine.code.records, **local}
+
+
+def _named(
+    tokens: Sequence[Token], types: Mapping[str, VariableType], machine: Machine, procedure: str | None
+) -> list[Token]:
+    """Return the tokens of an expression with names as the whole program knows them, where a file writes others."""
+    code, local, file = machine.code, frozenset[str](), 0
+    if procedure is not None:
+        own = code.procedures[procedure]
+        local = frozenset(own.types) | frozenset(own.records)
+        file = code.source.file_number(code.instructions[own.start].span.start)
+    written = {key: name for key, name in code.names.get(0, {}).items() if "." in key or file == 0}
+    written |= code.names.get(file, {})
+    named = []
+    for before, token in zip([None, *tokens], tokens, strict=False):
+        key = token.key
+        is_field = before is not None and before.key == "."
+        if token.kind is TokenKind.NAME and not is_field and key not in local and key.partition(".")[0] not in local:
+            # Of a record of a module, a field stands behind its name.
+            record, point, field = key.rpartition(".")
+            key = written.get(key, f"{written[record]}.{field}" if point and record in written else key)
+        named.append(attrs.evolve(token, key=key, kind=TokenKind.NAME if key in types else token.kind))
+    return named
+
+
+def _require_fields(
+    node: tree.Expression, types: Mapping[str, VariableType], machine: Machine, procedure: str | None
+) -> None:
+    """Refuse a whole record in an expression."""
+    records = visible_records(machine, procedure)
+    for part in walk(node):
+        if isinstance(part, tree.Name) and part.key in records and part.key not in types:
+            kind = records[part.key]
+            raise ExpressionError(f"`{part.text}` is a record of the type {kind}, and one of its fields is needed here")
+
+
+def _fields(node: tree.Expression, scope: Scope) -> list[tuple[str, tree.Expression]]:
+    """Return the fields of a whole record, each with its name."""
+    name = node.name if isinstance(node, tree.Index) else node
+    assert isinstance(name, tree.Name)  # noqa: S101 - a record is a name or an element of one
+    fields: list[tuple[str, tree.Expression]] = []
+    for key in scope.symbols.types:
+        record, _, field = key.rpartition(".")
+        if record == name.key:
+            part = attrs.evolve(name, text=f"{name.text}.{field.lower()}", key=key)
+            fields.append((field, attrs.evolve(node, name=part) if isinstance(node, tree.Index) else part))
+    return fields
 
 
 def _procedures(machine: Machine) -> dict[str, ProcedureSymbols]:
@@ -153,6 +218,17 @@ def find_slot(machine: Machine, frame: StackFrame, parsed: CheckedExpression) ->
     return evaluator.resolve_name(process, operand)
 
 
+def find_field_slots(machine: Machine, frame: StackFrame, parsed: CheckedExpression) -> dict[str, str]:
+    """Return where each field of a whole record is kept, by its key.
+
+    Raises:
+        ExpressionError: an index has no value, or there is no such element.
+    """
+    parts = ((field, attrs.evolve(parsed, node=node)) for field, node in _fields(parsed.node, parsed.scope))
+    slots = ((field, find_slot(machine, frame, part)) for field, part in parts)
+    return {field: slot for field, slot in slots if slot is not None}
+
+
 def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKind) -> Value:
     """Return the value of an expression that a variable of some kind shall get.
 
@@ -162,7 +238,8 @@ def evaluate_as(machine: Machine, frame: StackFrame, text: str, kind: VariableKi
     parsed = parse_expression(text, machine, frame.procedure)
     expected = TYPE_OF_KIND[kind]
     if parsed.type not in ACCEPTED_TYPES[expected]:
-        actual = "an array" if parsed.type is None else type_texts(parsed.node, parsed.type)[0]
+        whole = "a record" if parsed.record else "an array"
+        actual = whole if parsed.type is None else type_texts(parsed.node, parsed.type)[0]
         raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
     return evaluate(machine, frame, parsed)
 

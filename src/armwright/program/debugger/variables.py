@@ -1,7 +1,7 @@
 """What a debugger shows of a run that stands still: variables, frames, arms and the clock, one inside the other."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -52,16 +52,70 @@ def scopes(machine: Machine, frame: StackFrame) -> list[Variable]:
     local_types = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
     # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
     local = {key: slot for key, slot in frame.activation.bindings.items() if key in local_types}
-    values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
+    records = machine.code.records
+    values = {
+        key: key
+        for key, kind in machine.code.types.items()
+        if kind.sizes or kind.kind is not VariableKind.FRAME or key.rpartition(".")[0] in records
+    }
+    local_records = {} if frame.procedure is None else machine.code.procedures[frame.procedure].records
     parts: list[tuple[str, Callable[[], Sequence[Variable]]]] = [
-        ("Locals", lambda: [make_variable(machine, slot, name=machine.spelling(key)) for key, slot in local.items()]),
-        ("Variables", lambda: [make_variable(machine, value) for value in values]),
+        ("Locals", lambda: _variables(machine, local, local_records)),
+        ("Variables", lambda: _variables(machine, values, records)),
         ("Frames", lambda: [make_variable(machine, name) for name in frame_names(machine)]),
         ("Arms", lambda: [_arm_variable(machine, name) for name in machine.cell.arms]),
         ("Run", lambda: list(_run_variables(machine, frame.process))),
     ]
     contents = {"Locals": local, "Variables": values}
     return [Variable(name=name, value="", children=inside) for name, inside in parts if contents.get(name, True)]
+
+
+def _variables(machine: Machine, slots: Mapping[str, str], records: Mapping[str, str]) -> list[Variable]:
+    """Return variables by key and where they are kept, and records in the place of their fields."""
+    grouped: dict[str, dict[str, str]] = {}
+    for key, slot in slots.items():
+        record, _, field = key.rpartition(".")
+        grouped.setdefault(record if record in records else key, {})[field] = slot
+    return [
+        record_variable(machine, _record_name(machine, key, fields), records[key], fields)
+        if key in records
+        else make_variable(machine, slots[key], name=machine.spelling(key))
+        for key, fields in grouped.items()
+    ]
+
+
+def _record_name(machine: Machine, key: str, fields: Iterable[str]) -> str:
+    """Return the name of a record as the names of its fields spell it."""
+    return next((machine.spelling(f"{key}.{field}").rpartition(".")[0] for field in fields), machine.spelling(key))
+
+
+def record_variable(machine: Machine, name: str, type_name: str, slots: Mapping[str, str]) -> Variable:
+    """Return a record with its fields inside, or an array of records.
+
+    Args:
+        machine: as it is seen now.
+        name: what to call it.
+        type_name: its type.
+        slots: where each field is kept, by its key.
+    """
+    sizes = next((machine.type_of(slot).sizes for slot in slots.values()), ())
+    if sizes:
+
+        def element(which: str) -> Variable:
+            kept = {field: slot + which for field, slot in slots.items()}
+            return record_variable(machine, name + which, type_name, kept)
+
+        elements, kind = ArrayElements(element, sizes), f"ARRAY [{','.join(map(str, sizes))}] OF {type_name}"
+        text = f"{len(elements)} elements"
+        return Variable(
+            name=name, value=text, type=kind, children=lambda: elements, element_count=len(elements), expression=name
+        )
+    inside = []
+    for slot in slots.values():
+        field = machine.spelling(slot).rpartition(".")[2]
+        inside.append(attrs.evolve(make_variable(machine, slot, name=field), expression=f"{name}.{field}"))
+    text = ", ".join(f"{field.name} = {field.value}" for field in inside)
+    return Variable(name=name, value=text, type=type_name, children=lambda: inside, expression=name)
 
 
 def frame_names(machine: Machine) -> list[str]:
@@ -170,15 +224,18 @@ def _position_text(machine: Machine, name: str) -> str:
 
 
 def _array_variable(machine: Machine, slot: str, name: str, kind: VariableType) -> Variable:
-    elements, text = ArrayElements(machine, slot, name, kind), f"{math.prod(kind.sizes)} elements"
+    def element(which: str) -> Variable:
+        return make_variable(machine, slot + which, name=name + which)
+
+    elements, text = ArrayElements(element, kind.sizes), f"{math.prod(kind.sizes)} elements"
     return Variable(name=name, value=text, type=str(kind), children=lambda: elements, element_count=len(elements))
 
 
 class ArrayElements(Sequence[Variable]):
     """The elements of an array, made when they are looked at: there may be a million."""
 
-    def __init__(self, machine: Machine, slot: str, name: str, kind: VariableType) -> None:
-        self._machine, self._slot, self._name, self._sizes = machine, slot, name, kind.sizes
+    def __init__(self, make_element: Callable[[str], Variable], sizes: tuple[int, ...]) -> None:
+        self._make_element, self._sizes = make_element, sizes
 
     def __len__(self) -> int:
         return math.prod(self._sizes)
@@ -194,8 +251,7 @@ class ArrayElements(Sequence[Variable]):
             number, index = divmod(number, size)
             indices.append(str(index + 1))
         which = f"[{','.join(reversed(indices))}]"
-        element = make_variable(self._machine, self._slot + which, name=self._name + which)
-        return attrs.evolve(element, name=which)
+        return attrs.evolve(self._make_element(which), name=which)
 
 
 # ---- arms and the run ----------------------------------------------------------------------------------------------

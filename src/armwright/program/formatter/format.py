@@ -15,6 +15,9 @@ from armwright.program.syntax.parser import parse
 
 # How long a line may be, in characters.
 WIDTH = 80
+# Of what the parser reports, this leaves the program as it was written: names that are too long, types that do not
+# exist, a MODULE in another place.
+_UNDERSTOOD = ("E103", "E205", "E250")
 # Digits in front of one of these are no line number.
 _NOT_NUMBERED = (",", ";", ")")
 
@@ -65,7 +68,11 @@ def _lines(source: Source, std: Standard, width: int) -> list[str]:
     text, _ = blank_line_numbers(source)
     scanned = scan(source, text, std)
     program, diagnostics = parse(source, scanned.tokens, std)
-    errors = sort_diagnostics(diagnostic for diagnostic in (*scanned.diagnostics, *diagnostics) if diagnostic.is_error)
+    errors = sort_diagnostics(
+        diagnostic
+        for diagnostic in (*scanned.diagnostics, *diagnostics)
+        if diagnostic.is_error and diagnostic.code not in _UNDERSTOOD
+    )
     if errors:
         raise UnformattableError(source, errors[0])
     pieces = pieces_of(text, scanned, program)

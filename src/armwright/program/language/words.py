@@ -62,6 +62,9 @@ RLO_2_WITH_CLAUSES = ("BLEND", "DURATION")
 # Values that need no argument. What a program, its procedures or its cell call so comes first.
 VALUES = frozenset(("PI", "TIME", "TRUE", "FALSE", "MESSAGE"))
 
+# Functions of a name that is no variable: an input or a device of the cell, a timer, an axis.
+FUNCTIONS_OF_NAMES = ("INPUT", "ANALOG", "OUTPUT", "SETTING", "TIMER", "FORCE", "TORQUE")
+
 # Types, and what starts a part in front of BEGIN, that are reserved nowhere: programs may use all of them as names.
 TYPES_IN_CONTEXT = ("BOOLEAN", "TEXT")
 HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE", "RECORD")

@@ -172,9 +172,13 @@ class Analysis:
         """Return the record that a name stands for as a whole; None where it stands for something else."""
         if occurrence.kind is not NameKind.UNKNOWN:
             return None
-        procedure, records = self.scopes.scope_at(occurrence.start).procedure, self.compiled.records
-        local = {} if procedure is None else records.get(procedure.node.name.key, {})
-        return local.get(occurrence.key) or records.get("", {}).get(occurrence.key)
+        return self.record_named(occurrence.key, occurrence.start)
+
+    def record_named(self, key: str, offset: int) -> RecordVariable | None:
+        """Return the record that a name stands for at a position; None where it stands for something else."""
+        scope, records = self.scopes.scope_at(offset), self.compiled.records
+        local = {} if scope.procedure is None else records.get(scope.procedure.node.name.key, {})
+        return local.get(key) or records.get("", {}).get(self.scopes.meant(key, scope))
 
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""

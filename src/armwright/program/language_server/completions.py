@@ -32,8 +32,10 @@ from armwright.program.language_server.analysis import Analysis, LexicalContext,
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import WORDS, WordDoc, word_doc
 from armwright.program.language_server.positions import span_range
+from armwright.program.language_server.records import array_before_point
 from armwright.program.language_server.signature_help import enclosing_call
 from armwright.program.language_server.symbol_index import NameKind
+from armwright.program.records.layout import RecordVariable
 from armwright.program.semantics.builtins import AXES, FUNCTIONS, JOINTS, MEASURES, WITH_AXIS, WITH_INPUT, WITH_QUEUE
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType
@@ -228,7 +230,10 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
     factory = _ItemFactory(analysis, span_range(codec, context.word), scope, snippets=snippets)
     operand = _operand_rule(expected, context.preceding, scope)
     words = (*operand.words, *_allowed_words(expected, context, compiled.standard))
-    if expected.starts_statement:
+    array = array_before_point(context.preceding)
+    if array is not None:
+        items = list(factory.fields(array.key, operand))
+    elif expected.starts_statement:
         items = list(factory.words(words, starts=True))
         if "MOVE" in words or "HALT" in words:
             items += [*factory.procedures(), *factory.names(_ANY_VALUE.kinds, starts=True)]
@@ -236,6 +241,11 @@ def completions(codec: PositionCodec, analysis: Analysis, offset: int, *, snippe
         items = [*factory.arms(operand), *factory.names(operand.kinds), *factory.devices(operand)]
         items += factory.own_functions(operand)
         items += [*factory.functions(operand), *factory.values(operand), *factory.words(words)]
+        items += factory.record_types() if "FRAME" in words else ()
+    qualifier = codec.text[context.word.start : context.word.end].rpartition(".")[0].upper()
+    if qualifier:
+        # Behind the point of a record or a module its own names follow.
+        items = [item for item in items if item.label.upper().startswith(f"{qualifier}.")]
     for number, item in enumerate(items):
         item.sort_text = f"{number:04d}"
     return items
@@ -351,8 +361,35 @@ class _ItemFactory:
             origin = "" if declared else "predeclared" if key in PREDECLARED else "imported"
             origin = f"of {local.node.name.text}" if local is not None and key in local_types else origin
             text = f"{name}[${{1:1}}]" if kind.sizes else name
+            if kind.sizes and self._record_of(key) is not None:
+                owner, _, field = name.rpartition(".")
+                name, text = f"{owner}[].{field}", f"{owner}[${{1:1}}].{field}"
             item, detail = _KINDS.get(kind.kind, Kind.Variable), f"{kind} {origin}".rstrip()
             yield self._item(name, item, text, detail, self._parent(key, kind))
+
+    def _record_of(self, key: str) -> RecordVariable | None:
+        """Return the record that a variable is a field of; None where it is none."""
+        owner, local = key.rpartition(".")[0], self._scope.procedure
+        records = self._analysis.compiled.records
+        own = {} if local is None else records.get(local.node.name.key, {})
+        return own.get(owner) or records.get("", {}).get(owner)
+
+    def fields(self, array: str, operand: _OperandRule) -> Iterator[CompletionItem]:
+        """Give the fields of the elements of an array of records that are of the right kind, or all."""
+        record = self._record_of(f"{array}.") or self._record_of(f"{self._analysis.scopes.meant(array, self._scope)}.")
+        fields = {} if record is None else record.type.fields
+        fits = {name: kind for name, kind in fields.items() if kind.key in operand.kinds}
+        for name, kind in (fits or fields).items():
+            assert record is not None  # noqa: S101 - it has fields
+            yield self._item(record.type.names[name].text, Kind.Field, "", f"{kind.text} of {record.type.name.text}")
+
+    def record_types(self) -> Iterator[CompletionItem]:
+        """Give the types of records that the program sees."""
+        compiled = self._analysis.compiled
+        for key, kind in compiled.record_types.items():
+            if name := self._written(key, kind.name):
+                fields = ", ".join(field.text for field in kind.names.values())
+                yield self._item(name, Kind.Struct, "", f"RECORD of {fields}")
 
     def _written(self, key: str, declared: Name) -> str:
         """Return how the program may write a name; empty for one of a module that it does not see."""

@@ -11,10 +11,18 @@ from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punc
 from armwright.program.language.source import Source
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import (
+    HEADERS_IN_CONTEXT,
+    PARAMETER_MODES,
+    PLAIN_CLAUSES_IN_CONTEXT,
     RLO_2_TYPES,
     SENSORS,
     STATEMENT_PHRASES,
+    STATEMENTS_ALONE,
+    STATEMENTS_BEFORE_NAME,
+    STATEMENTS_BEFORE_TEXT,
+    TYPES_IN_CONTEXT,
     VOCABULARIES,
+    WITH_CLAUSES_IN_CONTEXT,
     WORDS_IN_CONTEXT,
     Standard,
 )
@@ -29,6 +37,41 @@ DECLARATIONS = frozenset(_VOCABULARY.headers)
 TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES)) - WORDS_IN_CONTEXT
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
+
+# A name that is none of the reserved words, one blank or more behind a word; in the dialect of all editors.
+_RESERVED = rf"(?:{'|'.join(sorted(_VOCABULARY.reserved))})(?!\w)"
+_BEFORE_NAME = rf"(?=[ \t]+(?!{_RESERVED})[A-Z])"
+_BEFORE_VALUE = rf"(?=[ \t]+(?:NOT(?!\w)|(?!{_RESERVED})[A-Z0-9\"]))"
+_AT_END = r"(?=[ \t]*(?:;|[\r\n]|$|END(?!\w)|ELSE(?!\w)))"
+# Where a line or a statement begins.
+_AT_START = r"(?:^|(?<=;)|(?<=[;\t0-9] )|(?<=  )|(?<=BEGIN )|(?<=THEN )|(?<=ELSE )|(?<=DO ))"
+# Behind the goal of a MOVE or another clause, and in front of one or the end of the statement.
+_NO_WORD_BEFORE = "".join(rf"(?<!\b{word} )" for word in sorted(_VOCABULARY.reserved))
+_BEHIND_GOAL = rf"(?:^|(?<=  )|(?<=[,)\]] )|(?<=\w ){_NO_WORD_BEFORE})"
+_BEFORE_CLAUSE = r"(?=[ \t]*(?:;|[\r\n]|$|,?[ \t]*(?:VIA|WITH|ON)(?!\w)))"
+
+
+def _words(words: Iterable[str]) -> str:
+    return f"(?:{'|'.join(sorted(words))})"
+
+
+# Words that programs may use as names, where what is around them tells that they are words of the language: the kind
+# of each group, and a pattern that a variable of that name matches in no program, or in none that is formatted.
+CONTEXT_PATTERNS = (
+    ("declaration", rf"FUNCTION{_BEFORE_NAME}"),
+    ("declaration", rf"{_words(set(HEADERS_IN_CONTEXT) - {'FUNCTION'})}{_BEFORE_NAME}"),
+    ("declaration", rf'(?:(?<=")|(?<=" ))AS{_BEFORE_NAME}'),
+    ("type", rf"(?:(?<=[:])|(?<=: )|(?<=OF )){_words(TYPES_IN_CONTEXT)}(?=[ \t]*[;)])"),
+    ("keyword", rf"{_words(PARAMETER_MODES)}{_BEFORE_NAME}"),
+    ("keyword", rf"{_words(STATEMENTS_BEFORE_NAME)}{_BEFORE_NAME}"),
+    ("keyword", rf'{_words(STATEMENTS_BEFORE_TEXT)}(?=[ \t]*")'),
+    ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
+    ("keyword", rf"(?<=WITH ){_words(WITH_CLAUSES_IN_CONTEXT)}(?=[ \t]*=)"),
+    ("keyword", rf"{_BEHIND_GOAL}{_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
+    ("keyword", rf"(?:RETURN|WITHIN|WHEN){_BEFORE_VALUE}"),
+    ("keyword", r"WHEN(?=[ \t]+PRIORITY(?!\w))"),
+)
+_KINDS = {"declaration": Keyword.Declaration, "type": Keyword.Type, "keyword": Keyword}
 
 _PART = r"(?a:[A-Z]\w*)"
 _NAME = rf"{_PART}(?!\w)"
@@ -46,6 +89,13 @@ def _phrases() -> Iterator[tuple[str, _TokenType, str]]:
         yield rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase"
 
 
+def _context_rules() -> Iterator[tuple[str, _TokenType] | tuple[str, _TokenType, str]]:
+    """Yield the rules of words in context; the name behind FUNCTION is that of a function."""
+    for kind, pattern in CONTEXT_PATTERNS:
+        rule = rf"(?a:{pattern})", _KINDS[kind]
+        yield (*rule, "procedure") if pattern.startswith("FUNCTION") else rule
+
+
 class RloLexer(RegexLexer):
     """A Pygments lexer for RLO-2, which holds RLO-83.
 
@@ -56,7 +106,7 @@ class RloLexer(RegexLexer):
     name = "RLO"
     aliases: ClassVar[list[str]] = ["rlo"]
     filenames: ClassVar[list[str]] = ["*.rlo"]
-    flags = re.IGNORECASE
+    flags = re.IGNORECASE | re.MULTILINE
     tokens: ClassVar[dict[str, list[object]]] = {
         "root": [
             include("blank"),
@@ -64,6 +114,7 @@ class RloLexer(RegexLexer):
             *_phrases(),
             (_any_of(["UNITS"]), Keyword.Declaration, "units"),
             (_any_of(["PROCEDURE"]), Keyword.Declaration, "procedure"),
+            *_context_rules(),
             include("reserved"),
             include("operand"),
             include("sign"),

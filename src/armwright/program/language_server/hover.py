@@ -15,8 +15,9 @@ from armwright.program.language.units import UNITS, UnitSystem, convert, dimensi
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.keyword_docs import word_doc
 from armwright.program.language_server.positions import span_range
+from armwright.program.language_server.records import field_declared, field_of_element, module_at, type_named
 from armwright.program.language_server.symbol_index import NameKind, Occurrence
-from armwright.program.records.layout import RecordVariable
+from armwright.program.records.layout import RecordType
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -42,7 +43,15 @@ def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | Non
     item = analysis.occurrence_at(offset) or analysis.token_at(offset)
     if item is None:
         return None
-    described = _describe_name(analysis, item) if isinstance(item, Occurrence) else _describe_token(analysis, item)
+    span, module = item.span, module_at(analysis, offset)
+    if module is not None:
+        span, names, file = module
+        described: _Description | None = (
+            f"MODULE {analysis.text[span.start : span.end]}",
+            [f"file {file}", f"gives {', '.join(names)}"],
+        )
+    else:
+        described = _describe_name(analysis, item) if isinstance(item, Occurrence) else _describe_token(analysis, item)
     if described is None:
         return None
     code, lines = described
@@ -50,7 +59,7 @@ def hover(analysis: Analysis, offset: int, *, markdown: bool) -> lsp.Hover | Non
         content = lsp.MarkupContent(lsp.MarkupKind.Markdown, "\n\n".join((f"```rlo\n{code}\n```", *lines)))
     else:
         content = lsp.MarkupContent(lsp.MarkupKind.PlainText, "\n".join((code, *lines)).replace("`", ""))
-    return lsp.Hover(content, span_range(analysis.codec, item.span))
+    return lsp.Hover(content, span_range(analysis.codec, span))
 
 
 def _describe_token(analysis: Analysis, token: Token) -> _Description | None:
@@ -112,8 +121,8 @@ def _describe_name(analysis: Analysis, occurrence: Occurrence) -> _Description |
         case NameKind.PROCEDURE if procedure is not None:
             line = analysis.compiled.source.place(procedure.node.name.span.start)
             description = signature(procedure.node)[0], [f"declared in line {line}"]
-        case NameKind.UNKNOWN if (record := analysis.record(occurrence)) is not None:
-            description = _describe_record(analysis, record)
+        case NameKind.UNKNOWN:
+            description = _describe_of_records(analysis, occurrence)
         case NameKind.DEVICE:
             description = text, [_describe_device(analysis, key)]
         case NameKind.TARGET:
@@ -136,10 +145,28 @@ def _describe_plain(kind: NameKind, key: str) -> str:
     return f"a kind of error: {KINDS[key]}" if key in KINDS else own
 
 
-def _describe_record(analysis: Analysis, record: RecordVariable) -> _Description:
-    fields = (f"{record.type.names[key].text} : {kind.text}" for key, kind in record.type.fields.items())
-    line = analysis.compiled.source.place(record.name.span.start)
-    return f"{record.name.text} : {record}", [f"fields: {', '.join(fields)}", f"declared in line {line}"]
+def _describe_of_records(analysis: Analysis, occurrence: Occurrence) -> _Description | None:
+    """Return what there is to say about a record, a type of records or a field; None of anything else."""
+    place = analysis.compiled.source.place
+    if (element := field_of_element(analysis, occurrence)) is not None:
+        record, key = element
+        name, kind = record.type.names[key], record.type.fields[key]
+        title = f"{record.name.text}[{','.join(size.text for size in record.sizes)}].{name.text} : {kind.text}"
+        return title, [f"field of {record.type.name.text}, declared in line {place(name.span.start)}"]
+    if (declared := field_declared(analysis, occurrence)) is not None:
+        kind_of, key = declared
+        return f"{kind_of.names[key].text} : {kind_of.fields[key].text}", [f"field of {kind_of.name.text}"]
+    if (named := type_named(analysis, occurrence)) is not None:
+        line = place(named.name.span.start)
+        return f"RECORD {named.name.text}", [_fields_text(named), f"declared in line {line}"]
+    if (whole := analysis.record(occurrence)) is not None:
+        line = place(whole.name.span.start)
+        return f"{whole.name.text} : {whole}", [_fields_text(whole.type), f"declared in line {line}"]
+    return None
+
+
+def _fields_text(kind: RecordType) -> str:
+    return f"fields: {', '.join(f'{kind.names[key].text} : {field.text}' for key, field in kind.fields.items())}"
 
 
 def _describe_variable(analysis: Analysis, occurrence: Occurrence, text: str) -> _Description:

@@ -31,6 +31,7 @@ class LinkedProgram:
         tree: the headers and statements of all files, those of modules first.
         exported: the names that modules give, by their keys in the tree.
         brought: the names that modules give to the program's own file, as it may write them, and their keys.
+        names: of each file, by its number, its names that have other keys in the tree.
         diagnostics: what is wrong with the modules and their names, errors of syntax in modules included.
     """
 
@@ -38,6 +39,7 @@ class LinkedProgram:
     exported: frozenset[str]
     diagnostics: list[Diagnostic]
     brought: Mapping[str, str] = attrs.field(factory=dict)
+    names: Mapping[int, Mapping[str, str]] = attrs.field(factory=dict)
 
 
 def link(program: ProgramFiles, cell_frames: Collection[str] = ()) -> LinkedProgram:
@@ -67,7 +69,23 @@ def link(program: ProgramFiles, cell_frames: Collection[str] = ()) -> LinkedProg
     exported = frozenset(meaning.key for path in modules for meaning in names[path].own.values())
     whole = attrs.evolve(main.tree, headers=tuple(headers), statements=tuple(statements))
     brought = names[main.path].brought()
-    return LinkedProgram(tree=whole, exported=exported, diagnostics=diagnostics, brought=brought)
+    numbers = {module.path: number for number, module in enumerate(program.source.modules, 1)}
+    # The program's own file has a name for everything, be it that of a module that only another module imports.
+    whole_names = {
+        f"{module.name.key}.{key}": meaning.key
+        for path, file in program.files.items()
+        if (module := file.tree.module) is not None
+        for key, meaning in names[path].own.items()
+    }
+    renamed = {0: {**whole_names, **names[main.path].renamed()}}
+    renamed |= {numbers[path]: names[path].renamed() for path in numbers if path in names}
+    return LinkedProgram(
+        tree=whole,
+        exported=exported,
+        diagnostics=diagnostics,
+        brought=brought,
+        names={number: seen for number, seen in renamed.items() if seen},
+    )
 
 
 class _Linker:

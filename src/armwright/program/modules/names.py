@@ -55,6 +55,11 @@ class FileNames:
             keys |= {f"{module}.{key}": meaning.key for key, meaning in names.items()}
         return keys
 
+    def renamed(self) -> dict[str, str]:
+        """Return all names of the program's level that the file may write and that have other keys in the program."""
+        own = {key: meaning.key for key, meaning in self.own.items()}
+        return {written: key for written, key in {**self.brought(), **own}.items() if written != key}
+
 
 def declared_names(program: tree.Program) -> dict[str, tree.Name]:
     """Return the names of the program's level that a file declares, by key."""

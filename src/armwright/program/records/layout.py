@@ -11,9 +11,11 @@ import attrs
 from armwright.errors import closest, counted
 from armwright.program.language.diagnostic import Diagnostic, DiagnosticList, Label, did_you_mean
 from armwright.program.language.kinds import VariableKind
+from armwright.program.language.words import VALUES
 from armwright.program.modules.rewriting import Rewriter
-from armwright.program.semantics.builtins import WITH_NAME
+from armwright.program.semantics.builtins import FUNCTIONS, WITH_NAME
 from armwright.program.semantics.expression_types import quote_expression
+from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
 
 # What a field may be: an EVENT has no value that could be assigned.
@@ -67,11 +69,13 @@ class LaidOutProgram:
     Attributes:
         tree: what it says, with a variable for each field.
         variables: the records of the program, by key, and those of each procedure, by its key and theirs.
+        types: the types of records, by key.
         diagnostics: what is wrong with its records.
     """
 
     tree: tree.Program
     variables: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
+    types: Mapping[str, RecordType] = attrs.field(factory=dict)
     diagnostics: list[Diagnostic] = attrs.field(factory=list)
 
 
@@ -104,6 +108,8 @@ class _Layout:
         self._report_duplicates(program.declarations, (*(one.name for one in self._types.values()), *others))
         self._procedures = {node.name.key: node for node in program.procedures}
         self._parameters = {key: self._variables(node.parameters) for key, node in self._procedures.items()}
+        declared = (name for one in program.declarations for name in one.names)
+        self._known = {*(name.key for name in (*declared, *others)), *PREDECLARED, *VALUES, *FUNCTIONS}
         self._locals: Variables = {}
         self._hidden: frozenset[str] = frozenset()
         self._all: dict[str, Variables] = {"": self._globals}
@@ -119,7 +125,7 @@ class _Layout:
                 if id(variable) not in self._used:
                     text = f"`{variable.name.text}` is never used"
                     self._report("L304", text, variable.name.span, "declared here")
-        return LaidOutProgram(tree=whole, variables=self._all, diagnostics=self._diagnostics)
+        return LaidOutProgram(tree=whole, variables=self._all, types=self._types, diagnostics=self._diagnostics)
 
     # ---- declarations ----------------------------------------------------------------------------------------------
 
@@ -267,6 +273,10 @@ class _Layout:
         advice = f"write `{written}{index}.{first.text}`"
         self._report("E262", text, node.span, "a whole record", advice=advice)
 
+    def _is_unknown(self, name: tree.Name) -> bool:
+        """Whether nothing has a name, as far as the program itself can tell."""
+        return name.key not in self._known and name.key not in self._hidden and "." not in name.key
+
     def _is_special(self, node: tree.Function) -> bool:
         return node.name.key in WITH_NAME and node.name.key not in self._procedures
 
@@ -363,6 +373,11 @@ class _Layout:
                 arguments += self._fields(argument, given)
             elif wanted is None:
                 arguments.append(self._rewriter(argument))
+            if wanted is not None and isinstance(argument, tree.Name) and self._is_unknown(argument):
+                near = did_you_mean(closest(argument.text, [one.name.text for one in self._globals.values()]))
+                text = f"`{argument.text}` is not declared"
+                self._report("E202", text, argument.span, "unknown name", advice=near)
+                return tree.Poison(node.span)
             if (wanted is None) != (given is None) or (wanted and given and not _alike(wanted, given)):
                 what, written = _phrase(wanted) if wanted else "no record", quote_expression(argument)
                 text = f"parameter `{parameter.text}` of `{node.name.text}` is {what}"

@@ -201,6 +201,8 @@ def _begins_declaration(tokens: Sequence[Token], index: int) -> bool:
 def _end_of_header(tokens: Sequence[Token], index: int) -> int:
     if tokens[index].key == "VAR":
         return _end_of_variables(tokens, index)
+    if tokens[index].key == "RECORD":
+        return _index_after(tokens, _index_after(tokens, index, "END"), ";")
     if tokens[index].key not in ("PROCEDURE", "FUNCTION"):
         return _index_after(tokens, index, ";")
     index, depth = _index_after(tokens, index, "BEGIN"), 1

@@ -6,6 +6,7 @@ import attrs
 
 from armwright.errors import counted
 from armwright.program.language.units import Dimension
+from armwright.program.language.words import FUNCTIONS_OF_NAMES
 from armwright.program.semantics.expression_types import ACCEPTED_TYPES, ExpressionType, quote_expression, variable_keys
 from armwright.program.semantics.quantities import check_unit
 from armwright.program.semantics.scopes import NameResolver
@@ -18,10 +19,10 @@ WITH_AXIS = ("FORCE", "TORQUE")
 # Functions whose argument is an input or a device of the cell.
 WITH_INPUT = ("INPUT", "ANALOG")
 WITH_DEVICE = (*WITH_INPUT, "OUTPUT", "SETTING")
-# Functions whose argument is a name that is not declared.
-WITH_KEY = (*WITH_DEVICE, "TIMER")
 # Functions whose argument is a name that is no variable.
-WITH_NAME = (*WITH_AXIS, *WITH_KEY)
+WITH_NAME = FUNCTIONS_OF_NAMES
+# Functions whose argument is a name that is not declared.
+WITH_KEY = tuple(function for function in WITH_NAME if function not in WITH_AXIS)
 # Functions of the queue of an arm, which is their first argument.
 WITH_QUEUE = ("QUEUED", "CAPACITY", "AWAITED")
 # The goal of a MOVE by the positions of the joints, or by the name of a joint target of the cell.

@@ -8,7 +8,7 @@ from armwright.errors import closest
 from armwright.program.language.diagnostic import Details, DiagnosticList, Label, did_you_mean
 from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
-from armwright.program.language.words import Standard
+from armwright.program.language.words import FUNCTIONS_OF_NAMES, Standard
 from armwright.program.semantics.cell_symbols import ImportedFrames, KnownCell
 from armwright.program.semantics.expression_types import ExpressionType, quote_expression, type_texts, variable_keys
 from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Scope, Symbols, SymbolTable
@@ -183,6 +183,8 @@ class NameResolver:
         frames = self.cell.frames if self.cell is not None else {}
         if name.key in frames:
             advice = f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`"
+        elif name.key in FUNCTIONS_OF_NAMES:
+            advice = f"this is a function: write `{name.text}(name)`"
         elif near := self.closest_name(name.text, lambda: [*self.visible_names(), *self.arm_names()]):
             advice = did_you_mean(near)
         elif near := self.closest_name(name.text, lambda: [key for key in frames if key not in self.symbols.types]):

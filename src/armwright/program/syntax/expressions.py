@@ -7,7 +7,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from armwright.program.language.diagnostic import Fix
-from armwright.program.language.words import PRECEDENCE, PRECEDENCE_OF_NOT, Standard
+from armwright.program.language.source import Span
+from armwright.program.language.words import FUNCTIONS_OF_NAMES, PRECEDENCE, PRECEDENCE_OF_NOT, Standard
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.token_stream import MAX_DEPTH, TokenStream, describe_token
@@ -158,7 +159,7 @@ def _name_or_call(tokens: TokenStream) -> tree.Expression:
     if tokens.current.key == "[":
         return _index(tokens, name)
     if tokens.current.key != "(":
-        return name
+        return _function_of_name(tokens, name) if name.key in FUNCTIONS_OF_NAMES else name
     is_empty = tokens.standard is Standard.RLO_2 and tokens.peek().key == ")"
     arguments = expression_list(tokens, "a value", f"after {name.text}", empty=is_empty)
     tokens.height += 1
@@ -166,6 +167,22 @@ def _name_or_call(tokens: TokenStream) -> tree.Expression:
     if not arguments and not is_empty:
         return tokens.node(tree.Poison, start)
     return tokens.node(tree.Function, start, name, arguments)
+
+
+def _function_of_name(tokens: TokenStream, name: tree.Name) -> tree.Expression:
+    """Read ``TIMER t``, in the way of a statement, as the function that was meant; a variable of that name is one."""
+    argument = tokens.current
+    is_argument = argument.kind is _NAME and tokens.is_on_same_line() and tokens.peek().key not in ("=", ":=")
+    is_variable = name.key in tokens.declared or name.key in tokens.procedures
+    if not is_argument or is_variable or tokens.standard is not Standard.RLO_2:
+        return name
+    opening = Span(name.span.end, argument.start)
+    tokens.take()
+    tokens.height += 1
+    text, gap = f"`{name.text}` is a function here, and its argument stands in `( )`", tokens.gap_span()
+    fixes, advice = (Fix(opening, "("), Fix(gap, ")")), f"write `{name.text}({argument.text})`"
+    tokens.report_once("E112", text, argument.span, "expected `(` and `)` around this", fixes=fixes, advice=advice)
+    return tokens.node(tree.Function, name.span, name, (tree.Name(argument.span, argument.text, argument.key),))
 
 
 def _arm(tokens: TokenStream) -> tree.ArmName:

@@ -3,14 +3,24 @@
 const TYPED = 120; // a text is sent so long after the last key [ms]
 const editor = { version: 0, timer: null, lines: 0, problems: [], running: "" };
 const WORDS = new Map(Object.entries(data.words).flatMap(([kind, words]) => words.map((word) => [word, kind])));
+// Words that programs may use as names, where what is around them tells that they are words of the language.
+const CONTEXT = data.context.map(([kind, pattern]) => [kind, new RegExp(`${pattern}(?!\\w)`, "imy")]);
 const TOKEN = /(\{[^}]*\}?|\/\/[^\n]*)|("[^"\n]*"?)|(ARM[-_]\d+)|([A-Za-z_]\w*)|(\d+(?:\.\d+)?(?:E[+-]?\d+)?)/gi;
+
+function kindOfWord(text, at, word) {
+  const found = CONTEXT.find(([, pattern]) => {
+    pattern.lastIndex = at;
+    return pattern.test(text);
+  });
+  return found?.[0] ?? WORDS.get(word.toUpperCase());
+}
 
 function colouredText(text) {
   const pieces = [];
   let last = 0;
   for (const match of text.matchAll(TOKEN)) {
     const [token, comment, string, arm, word] = match;
-    const kind = comment ? "comment" : string ? "string" : arm ? "arm" : word ? WORDS.get(word.toUpperCase()) : "number";
+    const kind = comment ? "comment" : string ? "string" : arm ? "arm" : word ? kindOfWord(text, match.index, word) : "number";
     pieces.push({ from: last, to: match.index, kind: "" }, { from: match.index, to: match.index + token.length, kind: kind ?? "" });
     last = match.index + token.length;
   }
@@ -20,12 +30,13 @@ function colouredText(text) {
 
 // The pieces again, cut where a problem begins and ends.
 function withProblems(pieces) {
-  const cuts = editor.problems.flatMap(({ start, end }) => [start, Math.max(end, start + 1)]);
+  const problems = editor.problems.filter(({ file }) => !file);
+  const cuts = problems.flatMap(({ start, end }) => [start, Math.max(end, start + 1)]);
   return pieces.flatMap((piece) => {
     const inside = [...new Set(cuts.filter((cut) => cut > piece.from && cut < piece.to))].sort((a, b) => a - b);
     const edges = [piece.from, ...inside, piece.to];
     return edges.slice(1).map((to, i) => {
-      const problem = editor.problems.find(({ start, end }) => edges[i] >= start && edges[i] < Math.max(end, start + 1));
+      const problem = problems.find(({ start, end }) => edges[i] >= start && edges[i] < Math.max(end, start + 1));
       return { from: edges[i], to, kind: piece.kind, problem };
     });
   });
@@ -123,7 +134,7 @@ function showEditor(state) {
     const it = running.get(i + 1);
     button.classList.toggle("now", Boolean(it));
     button.style.setProperty("--hue", it ? armColour(Math.max(0, data.arms.findIndex(({ name }) => name === it.arm))) : "");
-    button.title = it ? it.process : "";
+    button.title = it ? `${it.process}, line ${it.place}` : "";
   });
 }
 
@@ -142,9 +153,9 @@ function followLine(line) {
 function showProblems(diagnostics) {
   byId("problems").replaceChildren(
     ...diagnostics.map((it) => {
-      const go = make("button", { type: "button", className: it.severity }, make("b", { textContent: `${it.code} line ${it.line}` }), ` ${it.text}`, ...it.helps.map((help) => make("small", { textContent: help })));
+      const go = make("button", { type: "button", className: it.severity }, make("b", { textContent: `${it.code} line ${it.line}${it.file ? ` of ${it.file}` : ""}` }), ` ${it.text}`, ...it.helps.map((help) => make("small", { textContent: help })));
       go.addEventListener("click", () => {
-        if (!editor.problems.length) return;
+        if (!editor.problems.length || it.file) return;
         byId("text").focus();
         byId("text").setSelectionRange(it.start, it.end);
       });

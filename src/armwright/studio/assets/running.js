@@ -31,7 +31,8 @@ function showRun(state) {
   const texts = { end: "ended", failed: "failed", breakpoint: "stands at a breakpoint", entry: "stands at its beginning", step: "stands", start: "stands at its beginning", exception: "stands at an error", pause: "stands" };
   const what = run && (run.playing ? "runs" : (texts[run.reason] ?? "stands"));
   byId("run-time").textContent = run ? `${number(run.time, 2)} s` : "";
-  const said = run ? `${what}${run.text ? `: ${run.text}` : ""}` : "";
+  const within = run && !run.playing && !run.ended ? run.lines.find(({ place }) => / of /.test(place)) : null;
+  const said = run ? `${what}${within ? ` in line ${within.place}` : ""}${run.text ? `: ${run.text}` : ""}` : "";
   if (byId("run-text").textContent !== said) byId("run-text").textContent = said;
   byId("run-text").classList.toggle("bad", Boolean(run?.text));
   showProcesses(run);
