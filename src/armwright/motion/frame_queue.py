@@ -44,7 +44,7 @@ from armwright.motion.obstruction import (
     singular,
     unmet,
 )
-from armwright.motion.path import NEGLIGIBLE, Path, check_reach, report_speed
+from armwright.motion.path import NEGLIGIBLE, Path, report_speed
 from armwright.motion.polynomials import composition, evaluate, shifted
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory, hold
@@ -168,15 +168,8 @@ class FrameQueue:
 
     @classmethod
     def at(cls, arm: AnyArm, q: Array, pace: Pace, now: float) -> FrameQueue:
-        """Return the queue of an arm that stands, without frames.
-
-        Raises:
-            IncapableArmError: no speed of its tool is known, nor asked for.
-        """
-        solver = solver_of(arm)
-        if pace.velocity is None:
-            check_reach(solver.arm)
-        X = np.asarray(solver.forward(q[None]))[0]
+        """Return the queue of an arm that stands, without frames."""
+        X = np.asarray(solver_of(arm).forward(q[None]))[0]
         return cls(pace=pace, q_start=q, X_last=X, law=AveragedLaw(np.array([now]), np.zeros(1), np.zeros(1)))
 
     @property

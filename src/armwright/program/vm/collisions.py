@@ -102,7 +102,7 @@ def refuse_collision(
     if machine.collisions is None:
         return
     hand = machine.state.hands[arm]
-    goal_part = _goal_part(machine, arm, trajectory)
+    goal_part = _goal_part(machine, arm, [trajectory])
     move = PlannedMove(
         arm=arm,
         stages=(trajectory.until(min(ahead, trajectory.duration)),),
