@@ -291,7 +291,7 @@ def current_queue(machine: Machine, process: Process, arm: str, span: Span) -> R
     queue = machine.state.queues.get(arm)
     if queue is None:
         text, help_ = f"{arm} has no open queue", f"write `QUEUE {arm} DO BEGIN ... END` around it"
-        raise machine.error(process, "E410", text, span, "into which queue?", helps=[help_])
+        raise machine.error(process, "E410", text, span, "its queue is not open here", helps=[help_])
     return queue if arm in machine.state.following else attrs.evolve(queue, path=None, labels=(), frames=())
 
 
