@@ -42,12 +42,16 @@ class Runner:
             queue = self.queue.put(self.solver, X, self.now)
         except PathError:
             return False
+        self.run_on(queue)
+        self.frames.append(X)
+        return True
+
+    def run_on(self, queue: FrameQueue) -> None:
+        """Let the arm run along another queue from now on."""
         motion = queue.trajectory(self.now, PERIOD)
         if self.running is not None:
             self.cut(motion)
         self.queue, self.running, self.since = queue, motion, self.now
-        self.frames.append(X)
-        return True
 
     def cut(self, motion: Trajectory) -> None:
         """End what runs; what comes goes on without a jump of positions, speeds and accelerations."""
@@ -126,6 +130,33 @@ def test_frames_at_random_times(name: str, sample: Sample) -> None:
         runner.check_path(blend)
         dry += runner.queue.stop_count
     sample.record(f"queues of {name}", sample.count(30), 0, run_dry=dry)
+
+
+def test_braking_at_random_times(sample: Sample) -> None:
+    """Braked at any time, the arm stands on its path; what comes meanwhile is gone to when it is resumed."""
+    for random in sample.cases(20):
+        blend = float(random.uniform(0.003, 0.03))
+        runner = Runner("ur5", Pace(100.0, None, blend))
+        for _ in range(7):
+            runner.put(drawn(random, runner.start))
+            runner.wait(float(random.choice([0.0, random.uniform(0, 0.4), random.uniform(0, 1)])))
+            if random.integers(0, 2):
+                runner.run_on(runner.queue.braked(runner.now))
+                held = runner.queue.end
+                assert held <= runner.now + 2.0
+                runner.wait(held - runner.now + float(random.choice([0.0, 0.3])))
+                runner.wait(PERIOD)
+                assert runner.queue.rests(runner.now)
+                if random.integers(0, 2):
+                    runner.put(drawn(random, runner.start))
+                assert runner.queue.end <= runner.now
+                runner.run_on(runner.queue.resumed(runner.now))
+        runner.wait(runner.queue.end - runner.now + PERIOD)
+        assert runner.queue.passed(runner.now) == len(runner.frames) - 1
+        runner.finish()
+        runner.check_limits()
+        runner.check_path(blend)
+    sample.record("queues braked", sample.count(20), 0)
 
 
 @pytest.mark.parametrize("name", STARTS)

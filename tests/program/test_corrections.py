@@ -170,6 +170,19 @@ def test_with_other_clauses(tmp_path: Path, text: str) -> None:
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
 
 
+def test_a_guard_ends_it(tmp_path: Path) -> None:
+    """Behind the HALT of a guard the arm brakes and stands, whatever the sensor says from then on."""
+    clauses = "WITH CORRECTION = 8 * TIME, WITH BOUND = 20, WITH RATE = 25, ON X(ARM_1) > 403 DO HALT"
+    recording = ran(f"MOVE ARM_1 TO g STRAIGHTLY, WITH SPEED = 10, {clauses} ; PAUSE 1 ;", cell(tmp_path))
+
+    (move,) = (effect for effect in recording.effects if effect.kind == "MOVE")
+    x, period = tool(recording)[:, 0], recording.cell.period
+    crossed = int((x > 0.403).argmax()) * period
+    assert crossed <= move.t1 <= crossed + 0.2
+    assert np.ptp(x[round(move.t1 / period) :]) <= 1e-9
+    check_limits(recording)
+
+
 def test_going_back(tmp_path: Path) -> None:
     """A copy of a machine in the middle of a corrected path goes on as the machine itself does."""
     here = cell(tmp_path)

@@ -191,6 +191,12 @@ def test_the_order_of_processes(tmp_path: Path) -> None:
         ("QUEUE ARM_1 DO BEGIN feed(3) ; g = AWAITED(ARM_1, 2) END ;", "E222", "frame 2 of the queue of ARM_1"),
         ("g = f ; AFFIX g TO ARM_1 ; QUEUE ARM_1 DO BEGIN feed(60) ; MOVE g TO f END ;", "E410", "cannot make a MOVE"),
         ("QUEUE ARM_1 DO BEGIN feed(80) ; PAUSE 0.1 ; RAISE lost END ;", "E508", "lost"),
+        (
+            """QUEUE ARM_1 WITH CAPACITY = 1 DO
+            BEGIN WHEN TIME > 0.1 DO BEGIN BRAKE ; feed(3) END ; feed(80) ; PAUSE 1 END ;""",
+            "E410",
+            "full, and braked",
+        ),
     ],
 )
 def test_what_goes_wrong(ur5: Cell, text: str, code: str, says: str) -> None:
@@ -243,6 +249,48 @@ def test_what_ends_it(ur5: Cell, text: str) -> None:
 
     assert recording.failure is None
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
+    check_limits(recording)
+
+
+LOOP = "FOR n = 1 TO 6 DO PUT f * XYZ(0, 60 * SIN(n * 60), 60 * COS(n * 60) - 60) TO ARM_1"
+
+
+def test_an_interrupt_brakes_and_resumes(ur5: Cell, sample: Sample) -> None:
+    """BRAKE in the action of a WHEN stops the arm on its path at any tick, and RESUME lets it go on to the end."""
+    free = ran(f"QUEUE ARM_1 WITH CAPACITY = 3, WITH BLEND = 10 DO {LOOP} ;", ur5)
+    for random in sample.cases(20):
+        time = float(random.uniform(0.0, free.duration))
+        action = "BEGIN BRAKE ; PRINT(TIME) ; PAUSE 0.5 ; PRINT(TIME) ; RESUME END"
+        body = f"BEGIN WHEN TIME > {time:.4f} DO {action} ; {LOOP} END"
+        recording = ran(f"QUEUE ARM_1 WITH CAPACITY = 3, WITH BLEND = 10 DO {body} ;", ur5)
+        stood, period = [float(line) for line in printed(recording)], recording.cell.period
+        if stood:
+            ticks = slice(round(stood[0] / period) + 1, round(stood[1] / period))
+            assert np.abs(recording.streams[0].qd[ticks]).max() <= 1e-9
+        check_limits(recording)
+        angles = np.radians(60 * np.arange(7))
+        way = np.stack([0 * angles, 0.06 * np.sin(angles), 0.06 * np.cos(angles) - 0.06], axis=1)
+        corners = np.array([0.40, 0.00, 0.25]) + way * (1, -1, -1)
+        assert off_the_legs(recording, corners).max() <= 3 / 8 * 0.01 + NEAR
+        assert np.linalg.norm(tool(recording)[-1] - corners[-1]) <= NEAR
+    sample.record("queues braked by interrupts", sample.count(20), 0)
+
+
+@pytest.mark.parametrize(
+    ("action", "line"),
+    [
+        ("BRAKE", "0 true"),
+        ("BEGIN BRAKE ; feed(90) ; PRINT(QUEUED(ARM_1)) ; RESUME END", "3 0 true"),
+        ("BEGIN BRAKE ; BRAKE ; RESUME ; RESUME END", "0 true"),
+        ("BEGIN BRAKE ; TRY RAISE lost RECOVER RESUME END END", "0 true"),
+    ],
+)
+def test_what_an_interrupt_leaves(ur5: Cell, action: str, line: str) -> None:
+    """Without RESUME the queue is empty behind the action; frames may be put in between."""
+    body = f"WHEN TIME > 0.1 DO {action} ; feed(60) ; feed(80) ; PAUSE 2 ; PRINT(QUEUED(ARM_1))"
+    recording = ran(f"QUEUE ARM_1 DO BEGIN {body} END ; MOVE ARM_1 TO f ; PRINT(DIST(ARM_1, f) < 0.01) ;", ur5)
+
+    assert " ".join(printed(recording)) == line
     check_limits(recording)
 
 

@@ -151,6 +151,7 @@ class FrameQueue:
         pieces: joints along the path, those behind the arm left out; the last one is what a corner may take.
         marks: where the frames are that were put in [m], those behind the arm too.
         stops: at which ways the arm stops although frames follow [m].
+        held: whether the arm brakes, or stands, somewhere on the path until it is resumed.
         stop_count: how often a frame has come too late to go on without a stop.
     """
 
@@ -165,6 +166,7 @@ class FrameQueue:
     marks: tuple[float, ...] = ()
     stops: tuple[float, ...] = ()
     stop_count: int = 0
+    held: bool = False
 
     @classmethod
     def at(cls, arm: AnyArm, q: Array, pace: Pace, now: float) -> FrameQueue:
@@ -174,11 +176,16 @@ class FrameQueue:
 
     @property
     def end(self) -> float:
-        """When the arm is at rest at its end [s]."""
+        """When the arm is at rest [s]."""
         return float(self.law.t[-1]) + (WINDOW if len(self.law.t) > 1 else 0.0)
 
+    @property
+    def length(self) -> float:
+        """Where the path ends [m]."""
+        return self.pieces[-1].end if self.pieces else float(self.law.s[-1])
+
     def rests(self, now: float) -> bool:
-        """Whether the arm stands at its end."""
+        """Whether the arm stands."""
         return now >= self.end - SAME_TIME
 
     def travelled(self, now: float) -> float:
@@ -191,8 +198,10 @@ class FrameQueue:
         return sum(mark <= way for mark in self.marks)
 
     def when_passed(self, number: int, now: float) -> float:
-        """Return when a frame, from 0, is passed that is not yet [s]."""
+        """Return when a frame, from 0, is passed that is not yet [s]; never on a path that is held before."""
         way = self.marks[number]
+        if way > self.law.s[-1] + _SAME:
+            return math.inf
         if way >= self.law.s[-1] - _SAME:
             return self.end
         return now + float(reached(averaged(self.law, now), np.array([way]))[0])
@@ -211,29 +220,27 @@ class FrameQueue:
             PathError: the arm cannot follow the leg to the frame.
             IncapableArmError: it cannot run along it at any speed.
         """
-        solver, end = solver_of(arm), float(self.law.s[-1])
+        solver, end = solver_of(arm), self.length
         leg = _leg(solver, self.X_last, X, self.pace)
         if leg.length < NEGLIGIBLE:
             return attrs.evolve(self, marks=(*self.marks, end))
         new = attrs.evolve(
             self, X_last=X, rates=leg.rates, most=leg.most, reach=leg.reach, marks=(*self.marks, end + leg.length)
         )
-        way = self.travelled(now)
-        ahead = () if self.rests(now) else tuple(piece for piece in self.pieces if piece.end > way - _SAME)
+        ahead = self._ahead(now)
         if ahead and (d := self._room(leg, ahead, now)):
             with contextlib.suppress(PathError):
                 pieces = (*ahead[:-1], *_round(solver, self, leg, d))
-                if (law := _run(pieces, self.law.until(self._begin(now), now), self.stops)) is not None:
+                law = self.law if self.held else _run(pieces, self.law.until(self._begin(now), now), self.stops)
+                if law is not None:
                     return attrs.evolve(new, pieces=pieces, law=law)
-        last = self.pieces[-1].joints if self.pieces else None
-        q = self.q_start if last is None else last(last.duration)
-        pieces = (*ahead, *_straight_on(solver, self, leg, q))
+        pieces = (*ahead, *_straight_on(solver, self, leg, self._joints_at(end)))
         if not ahead:
             law = _run(pieces, self.law.until(now, now), ())
             assert law is not None  # noqa: S101 - it begins at rest
             return attrs.evolve(new, pieces=pieces, law=law, stops=(), stop_count=self.stop_count + bool(self.pieces))
         # It stops first, and the average comes to rest then.
-        law = _run(pieces, self.law.until(self.end, now), ())
+        law = self.law if self.held else _run(pieces, self.law.until(self.end, now), ())
         assert law is not None  # noqa: S101 - it begins at rest
         return attrs.evolve(new, pieces=pieces, law=law, stops=(*self.stops, end), stop_count=self.stop_count + 1)
 
@@ -242,7 +249,50 @@ class FrameQueue:
         d = min(leg.reach, self.reach)
         fastest = max(leg.most, *(float(piece.most.max()) for piece in ahead))
         way, _ = self.law.at(now)
-        return d if way + WINDOW * fastest < self.law.s[-1] - d else 0.0
+        return d if way + WINDOW * fastest < self.length - d else 0.0
+
+    def _ahead(self, now: float) -> tuple[_Piece, ...]:
+        """Return the pieces that the arm has not left behind; none where it stands at the end of the path."""
+        if self.rests(now) and not self.held:
+            return ()
+        way = self.travelled(now)
+        return tuple(piece for piece in self.pieces if piece.end > way - _SAME)
+
+    def braked(self, now: float) -> FrameQueue:
+        """Return the queue whose arm brakes on its path as hard as it may, and stands there until it is resumed."""
+        law, (_, rate) = self.law.until(now, now), self.law.at(now)
+        if not rate:
+            return attrs.evolve(self, law=law, held=True)
+        edges, _, changes = _bounds_along(self.pieces)
+        begin, square = float(law.s[-1]), rate**2
+        inner = edges[edges > begin + _SAME]
+        ways = np.append(begin, inner)
+        on = segments_at(edges, (ways[:-1] + ways[1:]) / 2, len(changes))
+        lengths, squares = list[float](), [square]
+        for length, change in zip(np.diff(ways).tolist(), changes[on].tolist(), strict=True):
+            left = squares[-1] - 2 * change * length
+            lengths.append(length if left > 0 else squares[-1] / (2 * change))
+            squares.append(max(left, 0.0))
+            if left <= 0:
+                break
+        squares[-1] = 0.0
+        return attrs.evolve(self, law=law.then(np.array(lengths), np.sqrt(squares)), held=True)
+
+    def resumed(self, now: float) -> FrameQueue:
+        """Return the queue whose arm goes on along its path, from rest."""
+        pieces, law = self._ahead(now), self.law.until(max(now, self.end), now)
+        if law.s[-1] < self.length - _SAME:
+            run = _run(pieces, law, self.stops)
+            assert run is not None  # noqa: S101 - it begins at rest
+            law = run
+        return attrs.evolve(self, law=law, held=False)
+
+    def _joints_at(self, way: float) -> Array:
+        """Return the joint positions (n,) at a way on the path."""
+        if not self.pieces:
+            return self.q_start
+        piece = next((piece for piece in self.pieces if way <= piece.end), self.pieces[-1])
+        return piece.joints(min(max(way - piece.start, 0.0), piece.joints.duration))
 
     def _begin(self, now: float) -> float:
         """Return from when on the way may be another one [s]: where it rests at a stop, so does the average first."""
@@ -259,8 +309,7 @@ class FrameQueue:
             period: of the servo [s].
         """
         if self.rests(now):
-            last = self.pieces[-1].joints if self.pieces else None
-            return hold(self.q_start if last is None else last(last.duration), period)
+            return hold(self._joints_at(float(self.law.s[-1])), period)
         law = averaged(self.law, now)
         edges = np.concatenate([piece.start + piece.joints.times[:-1] for piece in self.pieces])
         cubics = np.concatenate([piece.joints.coefficients for piece in self.pieces])
@@ -307,7 +356,7 @@ def _leg(solver: Solver, A: Array, B: Array, pace: Pace) -> _Leg:
 def _round(solver: Solver, queue: FrameQueue, leg: _Leg, d: float) -> Iterator[_Piece]:
     """Give the pieces from where the end of a path was open, round a corner, to the new end."""
     assert queue.rates is not None  # noqa: S101 - there is a leg before
-    end, last = float(queue.law.s[-1]), queue.pieces[-1]
+    end, last = queue.length, queue.pieces[-1]
     corner = _Corner(queue.X_last, end, d, queue.rates, leg.rates)
     parts = [
         (last.start - end, -d, queue.most),
@@ -321,7 +370,7 @@ def _round(solver: Solver, queue: FrameQueue, leg: _Leg, d: float) -> Iterator[_
 def _straight_on(solver: Solver, queue: FrameQueue, leg: _Leg, q: Array) -> Iterator[_Piece]:
     """Give the pieces of a leg from a stop."""
     still = np.zeros(3)
-    corner = _Corner(queue.X_last, float(queue.law.s[-1]), 0.0, (still, still), leg.rates)
+    corner = _Corner(queue.X_last, queue.length, 0.0, (still, still), leg.rates)
     parts = [(0.0, leg.length - leg.reach, leg.most), (leg.length - leg.reach, leg.length, leg.most)]
     yield from _pieces(solver, corner, parts, q, None)
 
@@ -463,13 +512,12 @@ def _run(pieces: tuple[_Piece, ...], law: AveragedLaw, stops: tuple[float, ...])
     Returns:
         The way; None where it is too fast already for what comes.
     """
-    edges = np.append(np.concatenate([x.start + x.joints.times[:-1] for x in pieces]), pieces[-1].end)
-    most = _least_around(edges, np.concatenate([piece.most for piece in pieces]))
-    changes = _least_around(edges, np.concatenate([piece.changes for piece in pieces]), most)
+    edges, most, changes = _bounds_along(pieces)
     begin = float(law.s[-1])
     for end in (*(stop for stop in stops if stop > begin + _SAME), float(edges[-1])):
-        inner = np.flatnonzero((edges > begin + _SAME) & (edges < end - _SAME))
-        ways = np.concatenate([[begin], edges[inner], [end]])
+        inner = edges[(edges > begin + _SAME) & (edges < end - _SAME)]
+        # From rest to rest it takes two intervals.
+        ways = np.concatenate([[begin], inner if len(inner) else [(begin + end) / 2], [end]])
         on = segments_at(edges, (ways[:-1] + ways[1:]) / 2, len(most))
         lengths, squares, room = np.diff(ways), most[on] ** 2, 2 * changes[on] * np.diff(ways)
         slowest = [0.0]
@@ -487,6 +535,13 @@ def _run(pieces: tuple[_Piece, ...], law: AveragedLaw, stops: tuple[float, ...])
             law = law.rested(WINDOW)
         begin = end
     return law
+
+
+def _bounds_along(pieces: tuple[_Piece, ...]) -> tuple[Array, Array, Array]:
+    """Return ways (m + 1,), and the largest rates between them (m,), and how fast these may change (m,)."""
+    edges = np.append(np.concatenate([x.start + x.joints.times[:-1] for x in pieces]), pieces[-1].end)
+    most = _least_around(edges, np.concatenate([piece.most for piece in pieces]))
+    return edges, most, _least_around(edges, np.concatenate([piece.changes for piece in pieces]), most)
 
 
 def _least_around(edges: Array, values: Array, most: Array | None = None) -> Array:

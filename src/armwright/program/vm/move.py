@@ -182,7 +182,8 @@ def advance_motion(machine: Machine, process: Process) -> None:
             process.pc = guard.action
             return
     due = motion.stage_end_tick
-    if motion.correction is not None:
+    # An arm that was stopped is corrected no more.
+    if motion.correction is not None and motion.rest_tick is None:
         correct(machine, process, motion)
         due = min(motion.stage_end_tick, motion.correction.tick)
     if machine.state.ticks < motion.stage_end_tick:

@@ -184,6 +184,7 @@ class Interruption:
         last_arm: named or moved last.
         motion: the MOVE that was put aside for a MOVE of the action; None where none was.
         braked: whether the action has braked the MOVE, and not resumed it.
+        held: the arms whose queues it has braked, and not resumed.
     """
 
     title: str
@@ -195,6 +196,7 @@ class Interruption:
     last_arm: str | None
     motion: Motion | None = None
     braked: bool = False
+    held: tuple[str, ...] = ()
 
 
 class StoppedOn(NamedTuple):

@@ -22,7 +22,7 @@ from armwright.program.vm.collisions import refuse_collision
 from armwright.program.vm.contact import refuse_contact, rest_tick, send_trajectory
 from armwright.program.vm.machine import Handler, Machine, RunError, jump_target
 from armwright.program.vm.move_diagnostics import CODES, obstacle_location, obstacle_message
-from armwright.program.vm.process import Motion, Process, RingQueue
+from armwright.program.vm.process import Interruption, Motion, Process, RingQueue
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
 from armwright.program.vm.tracking import leave_frame, rest_of_following, stop_following
 from armwright.spatial.poses import inverse
@@ -105,6 +105,11 @@ def _put(machine: Machine, process: Process, step: Instruction) -> None:
         if len(step.operands) > 2:
             process.pc = jump_target(step, 2)
             return
+        if queue.path.held:
+            text = f"the queue of {arm} is full, and braked"
+            raise machine.error(
+                process, "E410", text, step.span, "it would wait for ever", helps=["write RESUME before"]
+            )
         passed = queue.path.when_passed(len(queue.labels) - ahead, machine.now)
         process.pc, process.wake_tick = process.pc - 1, _tick_after(machine, passed)
         return
@@ -132,23 +137,29 @@ def _extend(machine: Machine, process: Process, queue: RingQueue, X_WF: Array, g
     except PathError as error:
         model = machine.cell.arms[arm].arm
         obstacle = obstacle_on_path(planner, Path(poses=np.stack([path.X_last, X_BF])), error)
-        text, notes = (
-            obstacle_message(obstacle, label, arm, model),
-            [obstacle_location(obstacle, "LINE", (label,), arm)],
-        )
+        text = obstacle_message(obstacle, label, arm, model)
+        notes = [obstacle_location(obstacle, "LINE", (label,), arm)]
         raise machine.error(process, CODES[obstacle.cause], text, span, "not put into the queue", notes=notes) from None
     except IncapableArmError as error:
         text = f"{arm} cannot go on to `{label}` at any speed: {error}"
         raise machine.error(process, "E406", text, span, "not put into the queue") from None
-    trajectory = grown.trajectory(now, machine.cell.period)
-    refuse_collision(machine, process, arm, trajectory, goal_at)
-    stage = PlannedStage(
-        kind="QUEUE", trajectory=trajectory, length=tool_path_length(planner, trajectory), deviation=NEAR
-    )
+    grown_queue = attrs.evolve(queue, labels=(*queue.labels, label), frames=(*queue.frames, X_WF))
+    if grown.held:
+        machine.state.queues[arm] = attrs.evolve(grown_queue, path=grown)
+    else:
+        _run_along(machine, process, grown_queue, grown, span)
+
+
+def _run_along(machine: Machine, process: Process, queue: RingQueue, path: FrameQueue, span: Span) -> None:
+    """Let an arm run along its path from now on, which is another one than before."""
+    arm, label = queue.arm, queue.labels[-1]
+    trajectory = path.trajectory(machine.now, machine.cell.period)
+    if not path.held:
+        refuse_collision(machine, process, arm, trajectory, (label, span))
+    length = tool_path_length(machine.cell.arms[arm].arm, trajectory)
+    stage = PlannedStage(kind="QUEUE", trajectory=trajectory, length=length, deviation=NEAR)
     _run(machine, process, queue, stage, label)
-    machine.state.queues[arm] = attrs.evolve(
-        queue, path=grown, labels=(*queue.labels, label), frames=(*queue.frames, X_WF)
-    )
+    machine.state.queues[arm] = attrs.evolve(queue, path=path)
 
 
 def _run(machine: Machine, process: Process, queue: RingQueue, stage: PlannedStage, label: str) -> None:
@@ -200,6 +211,37 @@ def _run(machine: Machine, process: Process, queue: RingQueue, stage: PlannedSta
     machine.state.following[arm] = motion
 
 
+def brake_queues(machine: Machine, process: Process, interruption: Interruption, span: Span) -> None:
+    """Brake the arms that run along queues of a process, on their paths; the process goes on when they are at rest."""
+    for arm in list(machine.state.following):
+        queue = machine.state.queues.get(arm)
+        if queue is None or queue.path is None or process not in machine.state.owners.get(arm, ()):
+            continue
+        if not queue.path.held:
+            _run_along(machine, process, queue, queue.path.braked(machine.now), span)
+            interruption.held = (*interruption.held, arm)
+            end = _tick_after(machine, machine.state.segments[arm][-1].t0 + machine.state.segments[arm][-1].duration)
+            machine.record_effect(process, "BRAKE", f"{arm} BRAKE", span, until=end, arm=arm)
+            process.wake_tick = max(process.wake_tick, end)
+
+
+def resume_queues(machine: Machine, process: Process, interruption: Interruption, span: Span) -> None:
+    """Let arms go on along their queues."""
+    for arm in interruption.held:
+        queue = machine.state.queues.get(arm)
+        if queue is not None and queue.path is not None and arm in machine.state.following:
+            _run_along(machine, process, queue, queue.path.resumed(machine.now), span)
+            machine.record_effect(process, "RESUME", f"{arm} RESUME", span, arm=arm)
+    interruption.held = ()
+
+
+def leave_queues(machine: Machine, interruption: Interruption, span: Span) -> None:
+    """Give up what is ahead in queues that an action has braked and not resumed: their arms stand there."""
+    for arm in interruption.held:
+        if machine.state.following.pop(arm, None) is not None:
+            machine.update_hand_pose(arm, span)
+
+
 def _close(machine: Machine, process: Process, step: Instruction) -> None:
     """Wait until the arm stands at its last frame, and close the queue."""
     arm = machine.resolve_name(process, step.operands[0])
@@ -249,7 +291,7 @@ def current_queue(machine: Machine, process: Process, arm: str, span: Span) -> R
     queue = machine.state.queues.get(arm)
     if queue is None:
         text, help_ = f"{arm} has no open queue", f"write `QUEUE {arm} DO BEGIN ... END` around it"
-        raise machine.error(process, "E410", text, span, "into which queue?", helps=[help_])
+        raise machine.error(process, "E410", text, span, "its queue is not open here", helps=[help_])
     return queue if arm in machine.state.following else attrs.evolve(queue, path=None, labels=(), frames=())
 
 

@@ -15,6 +15,7 @@ from armwright.program.vm.machine import Handler, Machine, jump_target
 from armwright.program.vm.move import brake_motion, finish_move, start_stage, stop_motion
 from armwright.program.vm.move_request import READS_POSES, operations
 from armwright.program.vm.process import Course, EarlyEnd, Interruption, Motion, PendingStage, Process, Watch
+from armwright.program.vm.queues import brake_queues, leave_queues, resume_queues
 from armwright.program.vm.synchronization import record_wait
 
 # Values that change without a statement of the program.
@@ -167,6 +168,7 @@ def _return(machine: Machine, process: Process, step: Instruction) -> None:
     process.wake_tick = max(now, interruption.wake_tick)
     if interruption.motion is not None:
         process.motion = interruption.motion
+    leave_queues(machine, interruption, step.span)
     if interruption.braked and process.motion is not None:
         stop_motion(machine, process, process.motion, step.span)
     process.unfulfilled_wait = interruption.unfulfilled_wait
@@ -202,11 +204,15 @@ def _brake(machine: Machine, process: Process, step: Instruction) -> None:
     interruption = None if motion is None else process.interruption_of(motion)
     if interruption is not None:
         brake_motion(machine, process, interruption, step.span)
+    elif motion is None and (interruption := process.interruption) is not None:
+        brake_queues(machine, process, interruption, step.span)
 
 
 def _resume(machine: Machine, process: Process, step: Instruction) -> None:
     """Let the MOVE that the action has braked go on, from where it was braked, while the action goes on too."""
     interruption = process.interruption
+    if interruption is not None and interruption.held:
+        resume_queues(machine, process, interruption, step.span)
     if interruption is None or not interruption.braked:
         return
     motion = interruption.motion or process.motion
