@@ -22,7 +22,6 @@ from armwright.program.language.words import (
     STATEMENTS_BEFORE_TEXT,
     TYPES_IN_CONTEXT,
     VOCABULARIES,
-    WITH_CLAUSES_IN_CONTEXT,
     WORDS_IN_CONTEXT,
     Standard,
 )
@@ -59,10 +58,11 @@ CONTEXT_PATTERNS = (
     ("declaration", rf'(?:(?<=")|(?<=" ))AS{_BEFORE_NAME}'),
     ("type", rf"(?:(?<=[:])|(?<=: )|(?<=OF )){_words(TYPES_IN_CONTEXT)}(?=[ \t]*[;)])"),
     ("keyword", rf"{_words(PARAMETER_MODES)}{_BEFORE_NAME}"),
-    ("keyword", rf"{_words(STATEMENTS_BEFORE_NAME)}{_BEFORE_NAME}"),
+    ("keyword", rf"{_words(('PUT', 'QUEUE', *STATEMENTS_BEFORE_NAME))}{_BEFORE_NAME}"),
     ("keyword", rf'{_words(STATEMENTS_BEFORE_TEXT)}(?=[ \t]*")'),
     ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
-    ("keyword", rf"(?<=WITH ){_words(WITH_CLAUSES_IN_CONTEXT)}(?=[ \t]*=)"),
+    # No variable stands between WITH and a sign of equality.
+    ("keyword", r"(?<=WITH )[A-Z]\w*(?=[ \t]*=)"),
     ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?=[ \t]*,?[ \t]*VIA(?!\w))"),
     ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_AT_END}"),
     ("keyword", rf"(?:RETURN|WITHIN|WHEN){_BEFORE_VALUE}"),
