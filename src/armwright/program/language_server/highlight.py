@@ -22,6 +22,7 @@ from armwright.program.language.words import (
     STATEMENTS_BEFORE_TEXT,
     TYPES_IN_CONTEXT,
     VOCABULARIES,
+    WITH_CLAUSES_IN_CONTEXT,
     WORDS_IN_CONTEXT,
     Standard,
 )
@@ -50,6 +51,8 @@ def _words(words: Iterable[str]) -> str:
     return f"(?:{'|'.join(sorted(words))})"
 
 
+# Clauses of queues and of corrected paths.
+_MORE_CLAUSES = ("BOUND", "CAPACITY", "CORRECTION", "RATE")
 # Words that programs may use as names, where what is around them tells that they are words of the language: the kind
 # of each group, and a pattern that a variable of that name matches in no program, or in none that is formatted.
 CONTEXT_PATTERNS = (
@@ -58,11 +61,10 @@ CONTEXT_PATTERNS = (
     ("declaration", rf'(?:(?<=")|(?<=" ))AS{_BEFORE_NAME}'),
     ("type", rf"(?:(?<=[:])|(?<=: )|(?<=OF )){_words(TYPES_IN_CONTEXT)}(?=[ \t]*[;)])"),
     ("keyword", rf"{_words(PARAMETER_MODES)}{_BEFORE_NAME}"),
-    ("keyword", rf"{_words(('PUT', 'QUEUE', *STATEMENTS_BEFORE_NAME))}{_BEFORE_NAME}"),
+    ("keyword", rf"{_words({*STATEMENTS_BEFORE_NAME, 'PUT', 'QUEUE'})}{_BEFORE_NAME}"),
     ("keyword", rf'{_words(STATEMENTS_BEFORE_TEXT)}(?=[ \t]*")'),
     ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
-    # No variable stands between WITH and a sign of equality.
-    ("keyword", r"(?<=WITH )[A-Z]\w*(?=[ \t]*=)"),
+    ("keyword", rf"(?<=WITH ){_words({*WITH_CLAUSES_IN_CONTEXT, *_MORE_CLAUSES})}(?=[ \t]*=)"),
     ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?=[ \t]*,?[ \t]*VIA(?!\w))"),
     ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_AT_END}"),
     ("keyword", rf"(?:RETURN|WITHIN|WHEN){_BEFORE_VALUE}"),
