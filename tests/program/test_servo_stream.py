@@ -37,6 +37,7 @@ CELLS = {
     "around": "puma_cell",
     "peg": "peg_cell",
     "press": "press_cell",
+    "press_zone": "press_zone_cell",
     "stack_by_vision": "vision_cell",
     "insert_peg": "socket_cell",
     "hand_over": "two_arms",

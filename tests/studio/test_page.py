@@ -185,6 +185,29 @@ def test_run_to_a_breakpoint_and_back(opened: Opened) -> None:
     opened.until(lambda: opened.state()["run"] is None)
 
 
+def test_modules(opened: Opened) -> None:
+    """Modules are shown below the program, with colours and breakpoints, and open where a run stands in them."""
+    page = opened.page
+    (opened.folder / "lib").mkdir()
+    module = "MODULE ways ;\nPROCEDURE up ;\nBEGIN\n  PAUSE 0.1 ;\nEND ;\nEND.\n"
+    (opened.folder / "lib" / "ways.rlo").write_text(module)
+    page.locator("#text").fill('IMPORT "lib/ways.rlo" ;\nCONST n = 1 ;\nBEGIN\n  PRINT(n) ; up() ;\nEND.\n')
+    opened.until(lambda: page.locator("#modules summary").count() == 1)
+    assert page.locator("#colours .declaration").all_inner_texts() == ["IMPORT", "CONST"]
+    page.locator("#modules summary").click()
+    assert page.locator("#modules .declaration").all_inner_texts() == ["MODULE", "PROCEDURE"]
+    page.get_by_role("button", name="Breakpoint in line 4 of lib/ways.rlo").click()
+    opened.until(lambda: page.locator("#modules [aria-pressed=true]").count() == 1)
+    page.locator("#modules summary").click()
+    page.locator("#run").click()
+    opened.until(lambda: (opened.state()["run"] or {}).get("reason") == "breakpoint")
+    opened.until(lambda: page.locator("#modules .now").count() == 1)
+    assert page.locator("#modules .now").inner_text() == "4"
+    assert "in line 4 of lib/ways.rlo" in page.locator("#run-text").inner_text()
+    page.locator("#stop").click()
+    opened.until(lambda: opened.state()["run"] is None)
+
+
 def test_the_editor(opened: Opened) -> None:
     """What is typed is checked, underlined and explained; a fix is one click."""
     page = opened.page

@@ -48,7 +48,7 @@ class Pages:
         """Return what a page shows, with what it has from before."""
         new = json.loads(json.dumps(self.studio.state(page), allow_nan=False))
         kept = self.kept.setdefault(page, {})
-        kept |= {name: new[name] for name in ("around", "file", "program") if name in new}
+        kept |= {name: new[name] for name in ("around", "file", "program", "modules") if name in new}
         return {**kept, **new}
 
     def wait(self, seconds: float) -> None:
@@ -607,7 +607,18 @@ def test_modules(pages: Pages) -> None:
     pages.wait(6.0)
     run = pages.state()["run"]
     assert (run["reason"], run["lines"][0]["line"], run["lines"][0]["place"]) == ("breakpoint", 4, "4")
+    assert pages.send("break", line=5, file="lib/ways.rlo", on=True) == ""
+    assert pages.state()["program"]["module_breakpoints"] == [["lib/ways.rlo", 5]]
+    assert pages.state()["modules"] == [{"path": "lib/ways.rlo", "text": MODULE}]
+    assert "no module 'lib/way.rlo'" in pages.send("break", line=5, file="lib/way.rlo", on=True)
+    assert "no line 50" in pages.send("break", line=50, file="lib/ways.rlo", on=True)
     np.testing.assert_allclose(pages.tool[:3, 3], (0.45, 0.1, 0.3), atol=1e-6)
+    pages.send("stop")
+    pages.send("run")
+    pages.wait(1.0)
+    run = pages.state()["run"]
+    (stood,) = run["lines"]
+    assert (run["reason"], stood["file"], stood["inner"], stood["line"]) == ("breakpoint", "lib/ways.rlo", 5, 3)
     pages.send("stop")
     (folder.parent / "ways.rlo").write_text(MODULE)
     (folder / "out.rlo").symlink_to(folder.parent / "ways.rlo")

@@ -244,10 +244,17 @@ class TouchUp:
 
 @attrs.frozen(kw_only=True)
 class Break:
-    """Set or remove a breakpoint."""
+    """Set or remove a breakpoint.
+
+    Attributes:
+        line: from 1.
+        on: whether it is set.
+        file: path of the module that the line is in, beside the program; empty for the program itself.
+    """
 
     line: int
     on: bool
+    file: str = ""
 
 
 @attrs.frozen(kw_only=True)

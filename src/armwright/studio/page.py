@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from armwright.program.language_server.highlight import CONTEXT_PATTERNS, DECLARATIONS, KEYWORDS, OPERATORS, TYPES
+from armwright.program.language_server.highlight import (
+    CONTEXT_PATTERNS,
+    DECLARATIONS,
+    KEYWORDS,
+    OPERATORS,
+    RESERVED_WORDS,
+    TYPES,
+)
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.report.animation import Animation, FrameTrack, MovedPart
 from armwright.report.arm_figure import arm_figure
@@ -25,6 +32,9 @@ from armwright.version import __version__
 _BLOCK_COMMENT = re.compile(r"^[ ]*/\*.*?\*/$", re.DOTALL | re.MULTILINE)
 _LINE_COMMENT = re.compile(r"(^|;) *// .*$", re.MULTILINE)
 # Blanks that mean nothing in a style: around what ends a rule or a declaration, and behind a colon or a comma.
+# Blanks that mean nothing, in lines of a script that have no text in them.
+_SCRIPT_BLANKS = re.compile(r" *([=<>&|?:,;{}()\[\]]) *")
+_WITH_TEXT = re.compile(r"""["'`/#]""")
 _STYLE_BLANKS = re.compile(r"\s*([{};])\s*|([:,])\s+")
 # Of the pages of results, and then those of the studio.
 _SHARED_SCRIPTS = (
@@ -45,6 +55,7 @@ _SCRIPTS = (
     "pendant.js",
     "teaching.js",
     "editor.js",
+    "modules.js",
     "assistance.js",
     "running.js",
     "charts_live.js",
@@ -62,7 +73,7 @@ def studio_page(workbench: Workbench, token: str, policy: str) -> str:
         token: with which it connects to its server.
         policy: what the page may do, as of Content-Security-Policy.
     """
-    script = _without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)]))
+    script = _without_blanks(_without_comments("\n".join([*map(asset, _SHARED_SCRIPTS), *map(_asset, _SCRIPTS)])))
     styles = "\n".join([*map(asset, ("page.css", "film.css", "view.css")), _asset("studio.css")])
     style = _STYLE_BLANKS.sub(r"\1\2", _without_comments(styles))
     return Template(_without_comments(_asset("studio.html"))).substitute(
@@ -81,6 +92,12 @@ def _without_comments(script: str) -> str:
     """Return a script, a style or a page without comments and blanks before lines, a seventh of it."""
     lines = map(str.strip, _LINE_COMMENT.sub(r"\1", _BLOCK_COMMENT.sub("", script)).splitlines())
     return "\n".join(filter(None, lines))
+
+
+def _without_blanks(script: str) -> str:
+    """Return a script without blanks around signs, where no text can have them."""
+    lines = script.splitlines()
+    return "\n".join(line if _WITH_TEXT.search(line) else _SCRIPT_BLANKS.sub(r"\1", line) for line in lines)
 
 
 def _shown_first(workbench: Workbench) -> dict[str, Any]:
@@ -121,5 +138,6 @@ def _shown_first(workbench: Workbench) -> dict[str, Any]:
             "keyword": sorted(KEYWORDS | OPERATORS),
             "function": sorted(FUNCTIONS),
         },
-        "context": CONTEXT_PATTERNS,
+        # The page knows the reserved words, which are most of these patterns.
+        "context": [(kind, pattern.replace(RESERVED_WORDS, "RESERVED")) for kind, pattern in CONTEXT_PATTERNS],
     }

@@ -39,6 +39,8 @@ _MOST_VARIABLES = 100
 # Of a path as many of the latest stretches are shown, each by so many points a second [1/s], and at most so many.
 _PATH_SEGMENTS, _PATH_RATE, _PATH_POINTS = 40, 25.0, 200
 
+# A line of the program, or the path of a module and a line in it.
+Breakpoint: TypeAlias = int | tuple[str, int]
 Step: TypeAlias = Literal["continue", "next", "in", "out", "stage", "tick", "back"]
 
 
@@ -82,7 +84,7 @@ class ProgramRun:
         code: Code,
         cell: Cell,
         hardware: HardwareFactory,
-        lines: Iterable[int],
+        lines: Iterable[Breakpoint],
         executor: Executor | None = None,
     ) -> None:
         """Load a program.
@@ -116,7 +118,7 @@ class ProgramRun:
 
     # ---- commands ------------------------------------------------------------------------------------------------
 
-    def set_breakpoints(self, lines: Iterable[int]) -> None:
+    def set_breakpoints(self, lines: Iterable[Breakpoint]) -> None:
         """Stop at these lines, and at no others, from what is shown on."""
         kept = frozenset(lines)
 
@@ -261,12 +263,15 @@ class ProgramRun:
             debugger.run_slice()
             self._leaps = True
 
-    def _take_lines(self, lines: Iterable[int]) -> None:
+    def _take_lines(self, lines: Iterable[Breakpoint]) -> None:
         debugger = self._debugger
-        for one in list(debugger.execution.breakpoints):
-            debugger.remove_breakpoint(one.number)
-        for line in lines:
-            debugger.add_breakpoint(line)
+        for known in list(debugger.execution.breakpoints):
+            debugger.remove_breakpoint(known.number)
+        files = {module.path: number for number, module in enumerate(debugger.machine.code.source.modules, 1)}
+        for one in lines:
+            path, line = ("", one) if isinstance(one, int) else one
+            if not path or path in files:
+                debugger.add_breakpoint(line, file=files.get(path, 0))
 
     def _stands(self) -> tuple[dict[str, Any], ...]:
         debugger = self._debugger
@@ -444,7 +449,11 @@ def _place(source: Source, *spans: Span) -> dict[str, Any]:
         spans: of what is done, and of the calls that led to it, the innermost first.
 
     Returns:
-        The line of the own file, 0 where nothing of all that is in it; and the line and file of the first.
+        The line of the own file, 0 where nothing of all that is in it; and of the first the line with its file in
+        words, the path of the module that it is in, and the line in that.
     """
     own = next((source.line(span.start) for span in spans if not source.file_number(span.start)), 0)
-    return {"line": own, "place": source.place(spans[0].start)}
+    start = spans[0].start
+    file = source.file_number(start)
+    path = source.modules[file - 1].path if file else ""
+    return {"line": own, "place": source.place(start), "file": path, "inner": source.line(start)}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from armwright.cell.model import Cell
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.extras import import_extra
 from armwright.files.inputs import read_program
 from armwright.files.output import write_back
@@ -141,6 +141,18 @@ class ProgramText:
 
     def _lacks_files(self) -> bool:
         return any(it.code == "E228" for it in self.compiled.diagnostics)
+
+    def line_count(self, file: str = "") -> int:
+        """Return how many lines the program has, or the module with a path.
+
+        Raises:
+            UnknownNameError: it has no such module.
+        """
+        source = self.compiled.source
+        paths = [module.path for module in source.modules]
+        if file and file not in paths:
+            raise UnknownNameError("module", file, paths)
+        return source.line_count(paths.index(file) + 1) if file else self.text.count("\n") + 1
 
     def completions(self, text: str, offset: int) -> list[dict[str, Any]]:
         """Return what can be written at a position, the likeliest first, as plain data.
@@ -410,6 +422,21 @@ class ProgramText:
             "runs": self.compiled.code is not None,
             "diagnostics": self._diagnostics,
         }
+
+    def modules(self) -> list[dict[str, str | None]]:
+        """Return the modules with their texts as plain data; None for texts that make all too long."""
+        left, modules = _LONGEST, list[dict[str, str | None]]()
+        for path, text in self.module_texts:
+            left -= len(text)
+            modules.append({"path": path, "text": text if left >= 0 else None})
+        return modules
+
+    @property
+    def module_texts(self) -> tuple[tuple[str, str], ...]:
+        """The modules of the program: paths and texts, whose lines end with line feeds."""
+        source = self.compiled.source
+        texts = (source.file_text(number).replace("\r\n", "\n") for number in range(1, len(source.modules) + 1))
+        return tuple(zip((module.path for module in source.modules), texts, strict=True))
 
     def _diagnostic_state(self, it: Diagnostic) -> dict[str, Any]:
         source = self.compiled.source

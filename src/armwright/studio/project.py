@@ -38,6 +38,7 @@ class Project:
         run: of the program; None where none runs.
         run_number: counts the runs.
         breakpoints: lines of the program.
+        module_breakpoints: paths of modules and lines in them.
         devices: that are on, while no program runs.
         inputs: that were set by hand while no program ran, with which the next run begins.
         compared: motions of earlier runs that are shown beside one another, at most two.
@@ -60,6 +61,7 @@ class Project:
         self.program = ProgramText(program, text, workbench.cell)
         self.run: ProgramRun | None = None
         self.breakpoints: set[int] = set()
+        self.module_breakpoints: set[tuple[str, int]] = set()
         self.devices: set[str] = set()
         self.inputs: dict[str, float] = {}
         self.compared: list[KeptMotion] = []
@@ -202,18 +204,32 @@ class Project:
         self.program.replace(text)
         self.breakpoints = moved_lines(self.breakpoints, before, text)
 
-    def set_breakpoint(self, line: int, *, on: bool) -> None:
-        """Set or remove a breakpoint."""
+    def set_breakpoint(self, line: int, *, on: bool, file: str = "") -> None:
+        """Set or remove a breakpoint.
+
+        Args:
+            line: from 1.
+            on: whether it is set.
+            file: path of the module that it is in; empty for the program itself.
+
+        Raises:
+            ProgramTextError: there is no such line, or there are too many breakpoints.
+            UnknownNameError: the program has no such module.
+        """
         if on:
-            if not 1 <= line <= self.program.text.count("\n") + 1:
+            if not 1 <= line <= self.program.line_count(file):
                 raise ProgramTextError(f"there is no line {line}")
-            if len(self.breakpoints) >= _MOST_BREAKPOINTS:
+            if len(self.breakpoints) + len(self.module_breakpoints) >= _MOST_BREAKPOINTS:
                 raise ProgramTextError(f"there are {_MOST_BREAKPOINTS} breakpoints already")
-            self.breakpoints.add(line)
+        if file:
+            (self.module_breakpoints.add if on else self.module_breakpoints.discard)((file, line))
         else:
-            self.breakpoints.discard(line)
+            (self.breakpoints.add if on else self.breakpoints.discard)(line)
         if self.run is not None:
-            self.run.set_breakpoints(self.breakpoints)
+            self.run.set_breakpoints(self._all_breakpoints())
+
+    def _all_breakpoints(self) -> list[int | tuple[str, int]]:
+        return [*self.breakpoints, *self.module_breakpoints]
 
     def start(self, line: int, *, only: bool, physics: bool, entry: bool) -> None:
         """Run the program.
@@ -245,7 +261,7 @@ class Project:
             return made
 
         self.run_number += 1
-        self.run = ProgramRun(compiled.code, cell, hardware, self.breakpoints, self.executor)
+        self.run = ProgramRun(compiled.code, cell, hardware, self._all_breakpoints(), self.executor)
         self.run.begin(stop_on_entry=entry)
 
     def running(self) -> ProgramRun:

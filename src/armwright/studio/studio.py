@@ -238,7 +238,7 @@ class Studio:
                 project.set_text(command.text, command.version)
                 self._sent[page]["source"] = project.program.version
             case m.Break():
-                project.set_breakpoint(command.line, on=command.on)
+                project.set_breakpoint(command.line, on=command.on, file=command.file)
             case m.Run():
                 rate = _checked_rate(command.rate)
                 project.start(command.line, only=command.only, physics=command.physics, entry=command.entry)
@@ -317,15 +317,16 @@ class Studio:
         # What a run shows depends on which it is, and on how far its paths are known.
         moved = () if run is None else (project.run_number, run.path_key)
         program, file = project.program, project.file
-        breakpoints = sorted(project.breakpoints)
+        breakpoints, in_modules = sorted(project.breakpoints), sorted(project.module_breakpoints)
         return {
             "around": (bench.around_key, bench.around_state),
             "file": (None if file is None else (file.text, file.changed, file.named), project.file_state),
             "program": (
-                (program.compilations, program.changed, tuple(breakpoints)),
-                lambda: {**program.state(), "breakpoints": breakpoints},
+                (program.compilations, program.changed, tuple(breakpoints), tuple(in_modules)),
+                lambda: {**program.state(), "breakpoints": breakpoints, "module_breakpoints": in_modules},
             ),
             "source": (program.version, lambda: program.text),
+            "modules": (program.module_texts, program.modules),
             "map": (
                 (bench.map_number, bench.map is not None and (bench.map.done, bench.map.known // _MAP_POINTS)),
                 lambda: None if bench.map is None else bench.map.state(),

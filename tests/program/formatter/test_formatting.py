@@ -84,7 +84,7 @@ def meaning(text: str, std: Standard) -> object:
     """Return the tree of a program as plain data: without places, names as they are compared."""
     _, words = scanned(text, std)
     program, slips = parse(Source("t.rlo", text), words.tokens, std)
-    assert not slips
+    assert {slip.code for slip in slips} <= {"E103", "E205", "E250"}, slips
     return plain(program)
 
 

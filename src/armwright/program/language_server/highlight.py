@@ -38,23 +38,21 @@ TYPES = frozenset((*_VOCABULARY.types, *RLO_2_TYPES)) - WORDS_IN_CONTEXT
 OPERATORS = frozenset(("AND", "OR", "NOT"))
 KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 
-# A name that is none of the reserved words, one blank or more behind a word; in the dialect of all editors.
-_RESERVED = rf"(?:{'|'.join(sorted(_VOCABULARY.reserved))})(?!\w)"
-_BEFORE_NAME = rf"(?=[ \t]+(?!{_RESERVED})[A-Z])"
-_BEFORE_VALUE = rf"(?=[ \t]+(?:NOT(?!\w)|(?!{_RESERVED})[A-Z0-9\"]))"
+# A reserved word; and what is none, one blank or more behind a word; in the dialect of all editors.
+RESERVED_WORDS = rf"(?:{'|'.join(sorted(_VOCABULARY.reserved))})(?!\w)"
+_BEFORE_NAME = rf"(?=[ \t]+(?!{RESERVED_WORDS})[A-Z])"
+_BEFORE_VALUE = rf"(?=[ \t]+(?:NOT(?!\w)|(?!{RESERVED_WORDS})[A-Z0-9\"]))"
 _AT_END = r"(?=[ \t]*(?:;|[\r\n]|$|END(?!\w)|ELSE(?!\w)))"
 # Where a line or a statement begins.
 _AT_START = r"(?:^|(?<=;)|(?<=[;\t0-9] )|(?<=  )|(?<=BEGIN )|(?<=THEN )|(?<=ELSE )|(?<=DO ))"
-# Behind the goal of a MOVE or another clause, and in front of one or the end of the statement.
-_NO_WORD_BEFORE = "".join(rf"(?<!\b{word} )" for word in sorted(_VOCABULARY.reserved))
-_BEHIND_GOAL = rf"(?:^|(?<=  )|(?<=[,)\]] )|(?<=\w ){_NO_WORD_BEFORE})"
-_BEFORE_CLAUSE = r"(?=[ \t]*(?:;|[\r\n]|$|,?[ \t]*(?:VIA|WITH|ON)(?!\w)))"
 
 
 def _words(words: Iterable[str]) -> str:
     return f"(?:{'|'.join(sorted(words))})"
 
 
+# Clauses of queues and of corrected paths.
+_MORE_CLAUSES = ("BOUND", "CAPACITY", "CORRECTION", "RATE")
 # Words that programs may use as names, where what is around them tells that they are words of the language: the kind
 # of each group, and a pattern that a variable of that name matches in no program, or in none that is formatted.
 CONTEXT_PATTERNS = (
@@ -63,11 +61,12 @@ CONTEXT_PATTERNS = (
     ("declaration", rf'(?:(?<=")|(?<=" ))AS{_BEFORE_NAME}'),
     ("type", rf"(?:(?<=[:])|(?<=: )|(?<=OF )){_words(TYPES_IN_CONTEXT)}(?=[ \t]*[;)])"),
     ("keyword", rf"{_words(PARAMETER_MODES)}{_BEFORE_NAME}"),
-    ("keyword", rf"{_words(STATEMENTS_BEFORE_NAME)}{_BEFORE_NAME}"),
+    ("keyword", rf"{_words({*STATEMENTS_BEFORE_NAME, 'PUT', 'QUEUE'})}{_BEFORE_NAME}"),
     ("keyword", rf'{_words(STATEMENTS_BEFORE_TEXT)}(?=[ \t]*")'),
     ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
-    ("keyword", rf"(?<=WITH ){_words(WITH_CLAUSES_IN_CONTEXT)}(?=[ \t]*=)"),
-    ("keyword", rf"{_BEHIND_GOAL}{_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
+    ("keyword", rf"(?<=WITH ){_words({*WITH_CLAUSES_IN_CONTEXT, *_MORE_CLAUSES})}(?=[ \t]*=)"),
+    ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?=[ \t]*,?[ \t]*VIA(?!\w))"),
+    ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_AT_END}"),
     ("keyword", rf"(?:RETURN|WITHIN|WHEN){_BEFORE_VALUE}"),
     ("keyword", r"WHEN(?=[ \t]+PRIORITY(?!\w))"),
 )

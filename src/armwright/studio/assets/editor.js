@@ -4,7 +4,8 @@ const TYPED = 120; // a text is sent so long after the last key [ms]
 const editor = { version: 0, timer: null, lines: 0, problems: [], running: "" };
 const WORDS = new Map(Object.entries(data.words).flatMap(([kind, words]) => words.map((word) => [word, kind])));
 // Words that programs may use as names, where what is around them tells that they are words of the language.
-const CONTEXT = data.context.map(([kind, pattern]) => [kind, new RegExp(`${pattern}(?!\\w)`, "imy")]);
+const RESERVED = `(?:${["declaration", "type", "keyword"].flatMap((kind) => data.words[kind]).join("|")})(?!\\w)`;
+const CONTEXT = data.context.map(([kind, pattern]) => [kind, new RegExp(`${pattern.replaceAll("RESERVED", RESERVED)}(?!\\w)`, "imy")]);
 const TOKEN = /(\{[^}]*\}?|\/\/[^\n]*)|("[^"\n]*"?)|(ARM[-_]\d+)|([A-Za-z_]\w*)|(\d+(?:\.\d+)?(?:E[+-]?\d+)?)/gi;
 
 function kindOfWord(text, at, word) {

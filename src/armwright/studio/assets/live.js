@@ -3,7 +3,7 @@
 const RETRY = 500; // [ms]
 const live = { socket: null, awaiting: false, queue: new Map(), state: null, taken: 0, lost: false };
 const followers = [];
-const SELDOM = ["around", "file", "program"];
+const SELDOM = ["around", "file", "program", "modules"];
 // What takes a message that is no state, by the only key of that.
 const answers = {};
 

@@ -140,6 +140,7 @@ function start() {
       showPendantSoon();
       showTeaching(state);
       showEditor(state);
+      showModules(state);
       showRun(state);
     }
     showLink(state);
