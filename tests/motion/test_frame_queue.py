@@ -114,6 +114,7 @@ def drawn(random: np.random.Generator, X: Array) -> Array:
     return Y
 
 
+@pytest.mark.share(0.04)
 @pytest.mark.parametrize("name", STARTS)
 def test_frames_at_random_times(name: str, sample: Sample) -> None:
     """Whenever frames come, the arm keeps its limits and its path, and stops nowhere but at frames."""
@@ -159,6 +160,7 @@ def test_braking_at_random_times(sample: Sample) -> None:
     sample.record("queues braked", sample.count(20), 0)
 
 
+@pytest.mark.share(0.04)
 @pytest.mark.parametrize("name", STARTS)
 def test_no_stop_while_it_is_fed(name: str, sample: Sample) -> None:
     """With two frames ahead the arm never stops, whatever the corners are but for those straight back."""

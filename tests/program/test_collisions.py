@@ -239,6 +239,9 @@ def test_an_arm_that_is_stopped_in_the_way_of_another(tmp_path: Path) -> None:
       COEND END."""
     relying = "MOVE ARM_1 TO meet WITH SPEED = 10 ;"
 
+    queue = failure(text.format("QUEUE ARM_1 WITH SPEED = 10 DO PUT meet TO ARM_1"), cell).diagnostic
+    assert queue.code == "E406"
+    assert queue.label == "ARM_2 was to be elsewhere by then, but it has been stopped"
     fault = failure(text.format(relying), cell).diagnostic
     assert fault.code == "E406"
     assert "ARM_2 was to be elsewhere by then, but it has been stopped" in fault.notes

@@ -71,6 +71,7 @@ def check_limits(recording: Recording) -> None:
     assert (np.abs(limited_efforts(arm, tau)) <= limits.effort * (1 + 1e-3)).all()
 
 
+@pytest.mark.share(0.05)
 def test_random_sensors(tmp_path: Path, sample: Sample) -> None:
     """Whatever the sensor says, the path is within bound, rate and limits, and comes to what it says."""
     for random in sample.cases(30):
@@ -121,6 +122,7 @@ def test_without_a_sensor(tmp_path: Path) -> None:
     check_limits(moved)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [
@@ -151,6 +153,7 @@ def test_what_cannot_be_followed(tmp_path: Path, text: str, code: str, says: str
     assert printed(recovered) == ["1"]
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     "text",
     [

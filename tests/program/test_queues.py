@@ -94,6 +94,7 @@ def tool(recording: Recording) -> Array:
     return np.asarray((placed.base @ forward(placed.arm, recording.streams[0].q))[:, :3, 3])
 
 
+@pytest.mark.share(0.05)
 def test_random_programs(ur5: Cell, sample: Sample) -> None:
     """Frames put at random times, into queues of any capacity: limits and path are kept, the end is the last frame."""
     for random in sample.cases(30):
@@ -179,6 +180,7 @@ def test_the_order_of_processes(tmp_path: Path) -> None:
     assert np.array_equal(streams[0], streams[2])
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [
@@ -232,6 +234,7 @@ def test_an_error_inside_of_the_queue(ur5: Cell) -> None:
     check_limits(recording)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     "text",
     [
@@ -255,6 +258,7 @@ def test_what_ends_it(ur5: Cell, text: str) -> None:
 LOOP = "FOR n = 1 TO 6 DO PUT f * XYZ(0, 60 * SIN(n * 60), 60 * COS(n * 60) - 60) TO ARM_1"
 
 
+@pytest.mark.share(0.05)
 def test_an_interrupt_brakes_and_resumes(ur5: Cell, sample: Sample) -> None:
     """BRAKE in the action of a WHEN stops the arm on its path at any tick, and RESUME lets it go on to the end."""
     free = ran(f"QUEUE ARM_1 WITH CAPACITY = 3, WITH BLEND = 10 DO {LOOP} ;", ur5)
@@ -276,6 +280,7 @@ def test_an_interrupt_brakes_and_resumes(ur5: Cell, sample: Sample) -> None:
     sample.record("queues braked by interrupts", sample.count(20), 0)
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("action", "line"),
     [
@@ -344,6 +349,7 @@ def test_names_and_variables(ur5: Cell) -> None:
     assert printed(run(Source("t.rlo", text), ur5)) == ["4"]
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("text", "code"),
     [

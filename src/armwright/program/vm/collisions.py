@@ -234,6 +234,14 @@ def check_others(machine: Machine, stopped: str) -> None:
         collision = _check(machine, _rest_of_move(machine, motion, stages), clearances=False).collision
         if collision is not None and collision.other_arm == stopped:
             motion.threat = Threat(machine.state.ticks, collision, stopped)
+    for arm, motion in machine.state.following.items():
+        # It goes on along its queue, or with a frame, while its process does other things.
+        rest = _rest_of_stage(machine, arm)
+        if arm == stopped or motion.threat is not None or rest is None:
+            continue
+        collision = _check(machine, _rest_of_move(machine, motion, [rest]), clearances=False).collision
+        if collision is not None and collision.other_arm == stopped:
+            motion.threat = Threat(machine.state.ticks, collision, stopped)
 
 
 def _rest_of_move(machine: Machine, motion: Motion, stages: Sequence[Trajectory]) -> PlannedMove:

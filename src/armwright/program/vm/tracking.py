@@ -20,6 +20,7 @@ from armwright.program.language.source import Span
 from armwright.program.language.units import HIGHEST_SPEED
 from armwright.program.vm.contact import stop_arm
 from armwright.program.vm.machine import Machine
+from armwright.program.vm.move_diagnostics import collision_advice, collision_message
 from armwright.program.vm.move_request import MoveRequest
 from armwright.program.vm.process import Motion, Process, Tracking
 from armwright.program.vm.recording import peak_efforts
@@ -207,17 +208,24 @@ def stop_all_following(machine: Machine, process: Process, span: Span) -> int:
 
 
 def next_loss(machine: Machine) -> tuple[int, str] | None:
-    """Return when the next arm can follow its frame no longer [ticks], and which; None where none loses it."""
+    """Return when the next arm can follow its frame or queue no longer [ticks], and which; None where all can."""
     losses = []
     for arm, motion in machine.state.following.items():
+        if motion.threat is not None:
+            losses.append((motion.threat.tick, arm))
         if motion.tracking is not None and motion.tracking.end is not None:
             losses.append((motion.stage_start_tick + motion.tracking.end, arm))
     return min(losses, default=None)
 
 
 def lose_frame(machine: Machine, process: Process, arm: str) -> Mishap:
-    """Stop an arm whose frame can be followed no longer, and say so."""
+    """Stop an arm whose frame or queue can be followed no longer, and say so."""
     motion = machine.state.following[arm]
+    if (threat := motion.threat) is not None:
+        stop_following(machine, process, arm, motion.span)
+        text = collision_message(threat.collision, machine.spelling(motion.goal), arm)
+        label = f"{threat.stopped} was to be elsewhere by then, but it has been stopped"
+        return Mishap(machine.now, arm, "E406", text, label, tuple(collision_advice(threat.collision, arm)))
     assert motion.tracking is not None  # noqa: S101 - it follows a frame
     frame, cut, goal = machine.spelling(motion.tracking.frame), motion.tracking.cut, machine.spelling(motion.goal)
     stop_following(machine, process, arm, motion.span)
