@@ -438,14 +438,14 @@ END.
 
 def test_debugger_knows_names_of_modules() -> None:
     """An expression means what it means in the file of the place where the program stands."""
-    main = 'IMPORT "boxes.rlo" AS g ;\nVAR n : SCALAR ;\nBEGIN\n  n = 1 ; g.put(g.row[2]) ; PRINT(n)\nEND.\n'
+    main = 'IMPORT "boxes.rlo" AS g ;\nVAR n, p : SCALAR ;\nBEGIN\n  n = 1 ; p = 9 ; g.put(g.row[2]) ; PRINT(n)\nEND.\n'
     cell = cell_of("cell1")
     program = compiled(main, {"boxes.rlo": BOXES}, cell)
     assert program.code is not None
     assert assemble(assembly(program.code)) == program.code
     debugger = Debugger(program.code, cell)
     debugger.begin()
-    debugger.add_breakpoint(4, 30)
+    debugger.add_breakpoint(4, 38)
     debugger.add_breakpoint(10, file=1, condition="boxes.n = 3 AND n = 3 AND g.own = own AND own = 5")
     seen = []
     while debugger.running:
@@ -454,12 +454,12 @@ def test_debugger_knows_names_of_modules() -> None:
         debugger.resume("continue")
         while debugger.running:
             debugger.run_slice(1.0)
-        names = ("n", "g.n", "boxes.n", "g.own", "g.twice(2)", "g.b.weight", "g.row[1 + 1].weight", "g.row[2]")
+        names = ("n", "g.n", "boxes.n", "g.own", "g.twice(2)", "g.b.weight", "g.row[1 + 1].weight", "g.row[2]", "p")
         seen.append([debugger.evaluate(name, ()).value for name in names])
 
     assert seen == [
-        ["3", "3", "3", "5", "12", "1", "1", "weight = 1"],
-        ["1", "3", "3", "5", "12", "1", "8", "weight = 8"],
+        ["3", "3", "3", "5", "12", "1", "1", "weight = 1", "weight = 1"],
+        ["1", "3", "3", "5", "12", "1", "8", "weight = 8", "9"],
     ]
 
 

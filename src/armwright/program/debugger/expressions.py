@@ -88,13 +88,13 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
         return CheckedExpression(source=source, node=node, type=None, scope=names.scope)
     name = node.name if isinstance(node, tree.Index) else node
     records = visible_records(machine, procedure)
-    if isinstance(name, tree.Name) and name.key in records and name.key not in types:
+    if isinstance(name, tree.Name) and name.key in records:
         # Of an element the index is checked, with one of its fields.
         if isinstance(node, tree.Index):
             type_check.infer_type(names, next(field for _, field in _fields(node, names.scope)))
             _raise_errors(names.diagnostics)
         return CheckedExpression(source=source, node=node, type=None, scope=names.scope, record=records[name.key])
-    _require_fields(node, types, machine, procedure)
+    _require_fields(node, records)
     sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
@@ -104,8 +104,10 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
 
 def visible_records(machine: Machine, procedure: str | None) -> dict[str, str]:
     """Return the records and arrays of records that can be named, with their types."""
-    local = {} if procedure is None else machine.code.procedures[procedure].records
-    return {**machine.code.records, **local}
+    if procedure is None:
+        return dict(machine.code.records)
+    own = machine.code.procedures[procedure]
+    return {**{key: kind for key, kind in machine.code.records.items() if key not in own.types}, **own.records}
 
 
 def _named(
@@ -131,13 +133,10 @@ def _named(
     return named
 
 
-def _require_fields(
-    node: tree.Expression, types: Mapping[str, VariableType], machine: Machine, procedure: str | None
-) -> None:
+def _require_fields(node: tree.Expression, records: Mapping[str, str]) -> None:
     """Refuse a whole record in an expression."""
-    records = visible_records(machine, procedure)
     for part in walk(node):
-        if isinstance(part, tree.Name) and part.key in records and part.key not in types:
+        if isinstance(part, tree.Name) and part.key in records:
             kind = records[part.key]
             raise ExpressionError(f"`{part.text}` is a record of the type {kind}, and one of its fields is needed here")
 
