@@ -110,18 +110,35 @@ def visible_records(machine: Machine, procedure: str | None) -> dict[str, str]:
     return {**{key: kind for key, kind in machine.code.records.items() if key not in own.types}, **own.records}
 
 
+def _written_names(machine: Machine, procedure: str | None) -> Mapping[str, str]:
+    """Return the names that the file of a procedure, or of the program, writes otherwise than the whole program."""
+    code = machine.code
+    first = 0 if procedure is None else code.procedures[procedure].start
+    file = 0 if procedure is None else code.source.file_number(code.instructions[first].span.start)
+    # What the program calls a name of a module is understood in every file.
+    qualified = {key: name for key, name in code.names.get(0, {}).items() if "." in key}
+    return {**qualified, **code.names.get(file, {})}
+
+
+def names_to_write(machine: Machine, procedure: str | None) -> list[str]:
+    """Return the names of variables, frames and records that an expression may write, as it may write them."""
+    types, records, code = visible_names(machine, procedure), visible_records(machine, procedure), machine.code
+    # Of an array of records the field stands behind the index.
+    single = [key for key, kind in types.items() if not kind.sizes or key.rpartition(".")[0] not in records]
+    keys = {*single, *records}
+    local = frozenset[str]() if procedure is None else frozenset(code.procedures[procedure].types)
+    written = {name: key for name, key in _written_names(machine, procedure).items() if key in keys - local}
+    qualified = [name.lower() for name in written if "." in name]
+    return [*map(code.spelled, keys), *qualified]
+
+
 def _named(
     tokens: Sequence[Token], types: Mapping[str, VariableType], machine: Machine, procedure: str | None
 ) -> list[Token]:
     """Return the tokens of an expression with names as the whole program knows them, where a file writes others."""
-    code, local, file = machine.code, frozenset[str](), 0
-    if procedure is not None:
-        own = code.procedures[procedure]
-        local = frozenset(own.types) | frozenset(own.records)
-        file = code.source.file_number(code.instructions[own.start].span.start)
-    written = {key: name for key, name in code.names.get(0, {}).items() if "." in key or file == 0}
-    written |= code.names.get(file, {})
-    named = []
+    own = None if procedure is None else machine.code.procedures[procedure]
+    local = frozenset[str]() if own is None else frozenset(own.types) | frozenset(own.records)
+    written, named = _written_names(machine, procedure), []
     for before, token in zip([None, *tokens], tokens, strict=False):
         key = token.key
         is_field = before is not None and before.key == "."
