@@ -16,6 +16,7 @@ from armwright.program import Compilation, Source, compile as translate, run
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.debugger import Debugger
+from armwright.program.debugger.expressions import names_to_write
 from armwright.program.diagnostics.fixes import apply_fixes
 from armwright.program.diagnostics.render import render
 from armwright.program.diagnostics.sarif import to_sarif
@@ -438,29 +439,34 @@ END.
 
 def test_debugger_knows_names_of_modules() -> None:
     """An expression means what it means in the file of the place where the program stands."""
-    main = 'IMPORT "boxes.rlo" AS g ;\nVAR n : SCALAR ;\nBEGIN\n  n = 1 ; g.put(g.row[2]) ; PRINT(n)\nEND.\n'
+    main = 'IMPORT "boxes.rlo" AS g ;\nVAR n, p : SCALAR ;\nBEGIN\n  n = 1 ; p = 9 ; g.put(g.row[2]) ; PRINT(n)\nEND.\n'
     cell = cell_of("cell1")
     program = compiled(main, {"boxes.rlo": BOXES}, cell)
     assert program.code is not None
     assert assemble(assembly(program.code)) == program.code
     debugger = Debugger(program.code, cell)
     debugger.begin()
-    debugger.add_breakpoint(4, 30)
+    debugger.add_breakpoint(4, 38)
     debugger.add_breakpoint(10, file=1, condition="boxes.n = 3 AND n = 3 AND g.own = own AND own = 5")
-    seen = []
+    seen, offered = [], []
     while debugger.running:
         debugger.run_slice(1.0)
     for _ in range(2):
         debugger.resume("continue")
         while debugger.running:
             debugger.run_slice(1.0)
-        names = ("n", "g.n", "boxes.n", "g.own", "g.twice(2)", "g.b.weight", "g.row[1 + 1].weight", "g.row[2]")
+        names = ("n", "g.n", "boxes.n", "g.own", "g.twice(2)", "g.b.weight", "g.row[1 + 1].weight", "g.row[2]", "p")
+        procedure = debugger.stack(())[0].procedure
+        offered.append({*names_to_write(debugger.machine, procedure)} - {"WORLD", "STATION"})
         seen.append([debugger.evaluate(name, ()).value for name in names])
 
     assert seen == [
-        ["3", "3", "3", "5", "12", "1", "1", "weight = 1"],
-        ["1", "3", "3", "5", "12", "1", "8", "weight = 8"],
+        ["3", "3", "3", "5", "12", "1", "1", "weight = 1", "weight = 1"],
+        ["1", "3", "3", "5", "12", "1", "8", "weight = 8", "9"],
     ]
+    assert {"g.n", "boxes.n", "g.own", "g.b", "g.row", "b.weight", "row"} <= offered[1]
+    assert "row.weight" not in offered[0] | offered[1]
+    assert {"p", "p.weight", "own"} <= offered[0]
 
 
 def in_editor(folder: Path) -> tuple[Analysis, str]:

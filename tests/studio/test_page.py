@@ -185,7 +185,22 @@ def test_run_to_a_breakpoint_and_back(opened: Opened) -> None:
     opened.until(lambda: opened.state()["run"] is None)
 
 
-def test_modules(opened: Opened) -> None:
+def test_the_editor(opened: Opened) -> None:
+    """What is typed is checked, underlined and explained; a fix is one click."""
+    page = opened.page
+    page.locator("#text").fill(PROGRAM.replace("high * XYZ", "hihg * XYZ"))
+    opened.until(lambda: any(it["severity"] == "error" for it in opened.state()["program"]["diagnostics"]))
+    opened.until(lambda: page.locator("#colours .wavy").count() > 0)
+    assert page.locator("#colours .wavy.error").first.inner_text() == "hihg"
+    assert page.locator("#run").is_disabled()
+    page.locator("#text").fill(PROGRAM.replace("TO high ;", "TO high"))
+    page.get_by_role("button", name="Fix").first.click()
+    opened.until(lambda: not opened.state()["program"]["diagnostics"])
+    assert page.locator("#text").input_value().replace(" ", "") == PROGRAM.replace(" ", "")
+    see_modules(opened)
+
+
+def see_modules(opened: Opened) -> None:
     """Modules are shown below the program, with colours and breakpoints, and open where a run stands in them."""
     page = opened.page
     (opened.folder / "lib").mkdir()
@@ -206,20 +221,6 @@ def test_modules(opened: Opened) -> None:
     assert "in line 4 of lib/ways.rlo" in page.locator("#run-text").inner_text()
     page.locator("#stop").click()
     opened.until(lambda: opened.state()["run"] is None)
-
-
-def test_the_editor(opened: Opened) -> None:
-    """What is typed is checked, underlined and explained; a fix is one click."""
-    page = opened.page
-    page.locator("#text").fill(PROGRAM.replace("high * XYZ", "hihg * XYZ"))
-    opened.until(lambda: any(it["severity"] == "error" for it in opened.state()["program"]["diagnostics"]))
-    opened.until(lambda: page.locator("#colours .wavy").count() > 0)
-    assert page.locator("#colours .wavy.error").first.inner_text() == "hihg"
-    assert page.locator("#run").is_disabled()
-    page.locator("#text").fill(PROGRAM.replace("TO high ;", "TO high"))
-    page.get_by_role("button", name="Fix").first.click()
-    opened.until(lambda: not opened.state()["program"]["diagnostics"])
-    assert page.locator("#text").input_value().replace(" ", "") == PROGRAM.replace(" ", "")
 
 
 def test_a_lost_server(opened: Opened) -> None:

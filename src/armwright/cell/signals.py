@@ -1,7 +1,7 @@
 """Inputs and outputs of a cell: what a program switches, and what it reads at a time."""
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from operator import itemgetter
 from typing import TypeAlias
@@ -106,9 +106,11 @@ class Signals:
 
     def note_zone(self, name: str, changes: Changes) -> None:
         """Take note of what a zone tells from the first of some changes on, in place of what was to come then."""
-        before = tuple(change for change in self._zones.get(name, ()) if change[0] < changes[0][0] - _SAME_TIME)
-        goes_on = bool(before) and before[-1][1] == changes[0][1]
-        self._zones[name] = (*before, *changes[goes_on:])
+        known, (start, value) = self._zones.get(name, ()), changes[0]
+        before = known[: bisect_left(known, start - _SAME_TIME, key=itemgetter(0))]
+        goes_on = bool(before) and before[-1][1] == value
+        if not goes_on or len(changes) > 1 or len(before) < len(known):
+            self._zones[name] = (*before, *changes[goes_on:])
 
     def input(self, name: str, time: float | None = None) -> float:
         """Return what an input is now, or at a time: what came last of what gives it values, and its switch."""

@@ -28,10 +28,11 @@ class CellWorld:
         self.step = cell.period
         self._ends, self._count = ends, 0
         self._signals = Signals(cell.inputs)
+        known = configurations or {}
         for name, source in cell.inputs.items():
-            if source.zone is not None and source.zone.arm in (configurations or {}):
-                arm, q = cell.arms[source.zone.arm], (configurations or {})[source.zone.arm]
-                tools = arm.base @ forward(arm.arm, q)
+            if source.zone is not None and source.zone.arm in known:
+                arm = cell.arms[source.zone.arm]
+                tools = arm.base @ forward(arm.arm, known[source.zone.arm])
                 self._signals.note_zone(name, source.zone.changes(tools[:, :3, 3], 0.0, cell.period))
         addressed = {name: source.address for name, source in cell.inputs.items()}
         self._inputs = _names(addressed)

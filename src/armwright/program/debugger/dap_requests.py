@@ -17,7 +17,7 @@ from armwright.program.debugger.dap_session import (
     SourceKey,
 )
 from armwright.program.debugger.debugger import Command
-from armwright.program.debugger.expressions import visible_names
+from armwright.program.debugger.expressions import names_to_write
 from armwright.program.debugger.variables import ArrayElements, Variable
 from armwright.program.diagnostics.render import render
 from armwright.program.language.position_codec import UTF_16, PositionCodec
@@ -303,7 +303,7 @@ def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     typed = match[0] if match else ""
     path, level = session.frame(arguments)
     procedure = debugger.stack(path)[level].procedure
-    names = [debugger.code.spelled(name) for name in visible_names(debugger.machine, procedure)]
+    names = names_to_write(debugger.machine, procedure)
     words = sorted({*names, *FUNCTIONS, *debugger.machine.cell.arms, "frames"}, key=str.upper)
     start = column - len(typed) + session.first_column
     return {

@@ -88,13 +88,13 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
         return CheckedExpression(source=source, node=node, type=None, scope=names.scope)
     name = node.name if isinstance(node, tree.Index) else node
     records = visible_records(machine, procedure)
-    if isinstance(name, tree.Name) and name.key in records and name.key not in types:
+    if isinstance(name, tree.Name) and name.key in records:
         # Of an element the index is checked, with one of its fields.
         if isinstance(node, tree.Index):
             type_check.infer_type(names, next(field for _, field in _fields(node, names.scope)))
             _raise_errors(names.diagnostics)
         return CheckedExpression(source=source, node=node, type=None, scope=names.scope, record=records[name.key])
-    _require_fields(node, types, machine, procedure)
+    _require_fields(node, records)
     sort = type_check.infer_type(names, node)
     _raise_errors(names.diagnostics)
     if sort is None:
@@ -104,22 +104,41 @@ def parse_expression(text: str, machine: Machine, procedure: str | None) -> Chec
 
 def visible_records(machine: Machine, procedure: str | None) -> dict[str, str]:
     """Return the records and arrays of records that can be named, with their types."""
-    local = {} if procedure is None else machine.code.procedures[procedure].records
-    return {**machine.code.records, **local}
+    if procedure is None:
+        return dict(machine.code.records)
+    own = machine.code.procedures[procedure]
+    return {**{key: kind for key, kind in machine.code.records.items() if key not in own.types}, **own.records}
+
+
+def _written_names(machine: Machine, procedure: str | None) -> Mapping[str, str]:
+    """Return the names that the file of a procedure, or of the program, writes otherwise than the whole program."""
+    code = machine.code
+    first = 0 if procedure is None else code.procedures[procedure].start
+    file = 0 if procedure is None else code.source.file_number(code.instructions[first].span.start)
+    # What the program calls a name of a module is understood in every file.
+    qualified = {key: name for key, name in code.names.get(0, {}).items() if "." in key}
+    return {**qualified, **code.names.get(file, {})}
+
+
+def names_to_write(machine: Machine, procedure: str | None) -> list[str]:
+    """Return the names of variables, frames and records that an expression may write, as it may write them."""
+    types, records, code = visible_names(machine, procedure), visible_records(machine, procedure), machine.code
+    # Of an array of records the field stands behind the index.
+    single = [key for key, kind in types.items() if not kind.sizes or key.rpartition(".")[0] not in records]
+    keys = {*single, *records}
+    local = frozenset[str]() if procedure is None else frozenset(code.procedures[procedure].types)
+    written = {name: key for name, key in _written_names(machine, procedure).items() if key in keys - local}
+    qualified = [name.lower() for name in written if "." in name]
+    return [*map(code.spelled, keys), *qualified]
 
 
 def _named(
     tokens: Sequence[Token], types: Mapping[str, VariableType], machine: Machine, procedure: str | None
 ) -> list[Token]:
     """Return the tokens of an expression with names as the whole program knows them, where a file writes others."""
-    code, local, file = machine.code, frozenset[str](), 0
-    if procedure is not None:
-        own = code.procedures[procedure]
-        local = frozenset(own.types) | frozenset(own.records)
-        file = code.source.file_number(code.instructions[own.start].span.start)
-    written = {key: name for key, name in code.names.get(0, {}).items() if "." in key or file == 0}
-    written |= code.names.get(file, {})
-    named = []
+    own = None if procedure is None else machine.code.procedures[procedure]
+    local = frozenset[str]() if own is None else frozenset(own.types) | frozenset(own.records)
+    written, named = _written_names(machine, procedure), []
     for before, token in zip([None, *tokens], tokens, strict=False):
         key = token.key
         is_field = before is not None and before.key == "."
@@ -131,13 +150,10 @@ def _named(
     return named
 
 
-def _require_fields(
-    node: tree.Expression, types: Mapping[str, VariableType], machine: Machine, procedure: str | None
-) -> None:
+def _require_fields(node: tree.Expression, records: Mapping[str, str]) -> None:
     """Refuse a whole record in an expression."""
-    records = visible_records(machine, procedure)
     for part in walk(node):
-        if isinstance(part, tree.Name) and part.key in records and part.key not in types:
+        if isinstance(part, tree.Name) and part.key in records:
             kind = records[part.key]
             raise ExpressionError(f"`{part.text}` is a record of the type {kind}, and one of its fields is needed here")
 

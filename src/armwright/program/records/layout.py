@@ -274,8 +274,9 @@ class _Layout:
         self._report("E262", text, node.span, "a whole record", advice=advice)
 
     def _is_unknown(self, name: tree.Name) -> bool:
-        """Whether nothing has a name, as far as the program itself can tell."""
-        return name.key not in self._known and name.key not in self._hidden and "." not in name.key
+        """Whether nothing has a name; files that are imported may have frames of any name."""
+        is_known = name.key in self._known or name.key in self._hidden or "." in name.key
+        return not is_known and not self._program.imports
 
     def _is_special(self, node: tree.Function) -> bool:
         return node.name.key in WITH_NAME and node.name.key not in self._procedures

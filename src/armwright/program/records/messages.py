@@ -1,7 +1,7 @@
 """Messages about records: in the words of the program, and one for a record where every field would have one."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 
 import attrs
 
@@ -24,9 +24,10 @@ def in_terms_of_records(
         diagnostics: of the program.
         records: those of the program and of each procedure, by key.
     """
+    told = list(diagnostics)
     variables = [variable for group in records.values() for variable in group.values()]
-    if not variables:
-        return list(diagnostics)
+    if not variables or not told:
+        return told
     owners, fields = (
         "|".join(sorted({re.escape(name.text) for name in names}, key=len, reverse=True))
         for names in (
@@ -36,19 +37,18 @@ def in_terms_of_records(
     )
     field = re.compile(rf"(?<![\w.])((?:\w+\.)?(?:{owners}))\.({fields})\b({_INDICES})?", re.IGNORECASE)
     groups: dict[object, list[Diagnostic]] = {}
-    for diagnostic in diagnostics:
+    for diagnostic in told:
         key = (diagnostic.code, diagnostic.span, field.sub(r"\1\3", diagnostic.message))
         groups.setdefault(key, []).append(diagnostic)
-    return [
-        _reworded(group[0], lambda text: field.sub(r"\1\3.\2", text))
-        if len(group) == 1
-        else _joined([_reworded(one, lambda text: field.sub(r"\1\3", text)) for one in group])
-        for group in groups.values()
-    ]
+    return [_joined([_reworded(one, field, single=len(group) == 1) for one in group]) for group in groups.values()]
 
 
-def _reworded(diagnostic: Diagnostic, words: Callable[[str], str]) -> Diagnostic:
-    """Return a diagnostic with other words in its texts."""
+def _reworded(diagnostic: Diagnostic, field: re.Pattern[str], *, single: bool) -> Diagnostic:
+    """Return a diagnostic with fields as the program writes them, or, where it is not the only one, their record."""
+
+    def words(text: str) -> str:
+        return field.sub(r"\1\3.\2" if single else r"\1\3", text)
+
     return attrs.evolve(
         diagnostic,
         message=words(diagnostic.message),
@@ -56,16 +56,16 @@ def _reworded(diagnostic: Diagnostic, words: Callable[[str], str]) -> Diagnostic
         secondary=tuple(attrs.evolve(one, text=words(one.text)) for one in diagnostic.secondary),
         notes=map(words, diagnostic.notes),
         helps=map(words, diagnostic.helps),
-        fixes=tuple(attrs.evolve(fix, replacement=words(fix.replacement)) for fix in diagnostic.fixes),
+        # What cures one of several fields does not cure the record.
+        fixes=tuple(attrs.evolve(fix, replacement=words(fix.replacement)) for fix in diagnostic.fixes if single),
     )
 
 
 def _joined(group: list[Diagnostic]) -> Diagnostic:
-    """Return what diagnostics of several fields have in common."""
+    """Return what diagnostics have in common that differ in the field alone."""
     first, others = group[0], group[1:]
 
     def common(part: str) -> tuple[str, ...]:
         return tuple(text for text in getattr(first, part) if all(text in getattr(other, part) for other in others))
 
-    fixes = first.fixes if all(other.fixes == first.fixes for other in others) else ()
-    return attrs.evolve(first, notes=common("notes"), helps=common("helps"), fixes=fixes)
+    return attrs.evolve(first, notes=common("notes"), helps=common("helps"))

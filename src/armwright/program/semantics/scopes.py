@@ -184,7 +184,7 @@ class NameResolver:
         if name.key in frames:
             advice = f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`"
         elif name.key in FUNCTIONS_OF_NAMES:
-            advice = f"this is a function: write `{name.text}(name)`"
+            advice = f"this is a function: write `{name.text}(...)`"
         elif near := self.closest_name(name.text, lambda: [*self.visible_names(), *self.arm_names()]):
             advice = did_you_mean(near)
         elif near := self.closest_name(name.text, lambda: [key for key in frames if key not in self.symbols.types]):
