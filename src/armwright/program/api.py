@@ -28,7 +28,7 @@ from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.modules.files import ParsedFile, parse_file, read_files
 from armwright.program.modules.linking import LinkedProgram, check_module, link
 from armwright.program.modules.names import declared_names
-from armwright.program.records.layout import RecordType, RecordVariable, lay_out
+from armwright.program.records.layout import LaidOutProgram, RecordType, RecordVariable, lay_out
 from armwright.program.records.messages import in_terms_of_records
 from armwright.program.semantics import check
 from armwright.program.semantics.arguments import Arguments
@@ -70,13 +70,11 @@ class Compilation:
             it imports; None where there is none, or only its names are known.
         cell_symbols: what was known of the cell when the program was checked.
         strict: whether an AFFIX that is only implied is an error.
-        whole: what it says together with all modules, in which every name stands for one thing, and of records for
-            one field.
+        laid_out: what it says together with all modules, in which every name stands for one thing, and of records for
+            one field; with its records.
         spelling: how the names of the whole are written, by their keys.
         brought: the names that modules give, as this file may write them, with their keys in the whole.
         names: of each file, by its number, its names that have other keys in the whole.
-        records: the variables that are records, by key: of the program, under the empty text, and of each procedure.
-        record_types: their types, and those that no variable has, by key.
     """
 
     source: Source
@@ -92,12 +90,27 @@ class Compilation:
     cell: Cell | None = None
     cell_symbols: KnownCell | None = None
     strict: bool = False
-    whole: Program = attrs.field(default=attrs.Factory(lambda self: self.tree, takes_self=True))
+    laid_out: LaidOutProgram = attrs.field(
+        default=attrs.Factory(lambda self: LaidOutProgram(tree=self.tree), takes_self=True)
+    )
     spelling: Mapping[str, str] = attrs.field(factory=dict)
     brought: Mapping[str, str] = attrs.field(factory=dict)
     names: Mapping[int, Mapping[str, str]] = attrs.field(factory=dict)
-    records: Mapping[str, Mapping[str, RecordVariable]] = attrs.field(factory=dict)
-    record_types: Mapping[str, RecordType] = attrs.field(factory=dict)
+
+    @property
+    def whole(self) -> Program:
+        """What it says together with all modules."""
+        return self.laid_out.tree
+
+    @property
+    def records(self) -> Mapping[str, Mapping[str, RecordVariable]]:
+        """The variables that are records, by key: of the program, under the empty text, and of each procedure."""
+        return self.laid_out.variables
+
+    @property
+    def record_types(self) -> Mapping[str, RecordType]:
+        """Their types, and those that no variable has, by key."""
+        return self.laid_out.types
 
 
 @attrs.frozen(kw_only=True)
@@ -431,9 +444,7 @@ def _check_names(
         tokens=main.tokens,
         comments=main.scanned.comments,
         tree=main.tree,
-        whole=laid_out.tree,
-        records=laid_out.variables,
-        record_types=laid_out.types,
+        laid_out=laid_out,
         brought=linked.brought,
         names=linked.names,
         spelling=_name_spellings((main,) if files is None else files.files.values(), laid_out.tree),
