@@ -205,7 +205,7 @@ class ArmLife:
         over = [(k, 1 if name == "average" else 3) for k, one in enumerate(self.components) for name in one.exceeded]
         unit = "N m" if all(joint.revolute for joint in self.arm.joints) else "N m, N"
         yield ResultTable(
-            title=f"{self.arm.name}: reducers and bearings, first to fail in front",
+            title="Reducers and bearings, first to fail in front",
             heads=("joint", f"mean, {unit}", "RMS", "peak", "speed, deg/s", "of rated", "hours", "cycles"),
             rows=rows,
             numbers=range(1, 8),
