@@ -72,6 +72,7 @@ CALLS: dict[str, list[str]] = {
     "clearance estimate": ["five-bar", "rest.csv", "--json"],
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],
     "tolerance": ["puma560", "tolerances.toml", "-q", Q, "--limit", "0.5", "--samples", "20", "--json"],
+    "life": ["puma560", "efforts.csv", "life.toml", "--limit", "0.1", "--samples", "20", "--json"],
     "study": ["stanford-torque", "--json"],
     "kernel": ["ur5", "forward", "--json"],
 }
@@ -92,6 +93,7 @@ GIVEN = {
     "corners.csv": "board_corners.csv",
     "rest.csv": "five_bar_rest.csv",
     "tolerances.toml": "puma_tolerances.toml",
+    "life.toml": "puma_life.toml",
 }
 VALUES = [
     *("", " ", "-", "--", "-1", "0", "0.5", "1e-320", "1e999", "nan", "-inf", str(10**30), "9" * 5000, "1" * 99_999),

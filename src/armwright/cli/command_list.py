@@ -38,6 +38,7 @@ COMMANDS = {
     "plan-excitation": "Plan a motion from which masses, inertias and friction of an arm can be identified.",
     "identify": "Identify masses, inertias and friction of an arm from logs of its motions.",
     "tolerance": "Print how far tolerances of an arm's dimensions move its tool, with probabilities, and what to tighten or relax.",
+    "life": "Print how long the reducers, bearings and the repeatability of an arm last that repeats a motion.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
     "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",

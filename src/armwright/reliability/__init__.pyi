@@ -4,6 +4,12 @@ from .arm_errors import (
     sampled_errors as sampled_errors,
     tool_error as tool_error,
 )
+from .arm_life import (
+    ArmLife as ArmLife,
+    ComponentLife as ComponentLife,
+    RepeatedMotion as RepeatedMotion,
+    assess_life as assess_life,
+)
 from .assessment import ToleranceAssessment as ToleranceAssessment, assess_tolerances as assess_tolerances
 from .exceedance import exceedance as exceedance
 from .first_order import (
@@ -11,6 +17,7 @@ from .first_order import (
     nearest_failure as nearest_failure,
     reliability_index as reliability_index,
 )
+from .life_file import LifeFile as LifeFile, PlayGrowth as PlayGrowth, read_life_file as read_life_file
 from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
 from .play_life import (
     PlayLife as PlayLife,
