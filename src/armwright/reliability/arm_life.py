@@ -203,10 +203,10 @@ class ArmLife:
         if rows:
             rows.append(("all", *[""] * 5, _count(self.hours), _count(self.cycles_of(self.hours))))
         over = [(k, 1 if name == "average" else 3) for k, one in enumerate(self.components) for name in one.exceeded]
-        unit = "N m" if all(joint.revolute for joint in self.arm.joints) else "N m, N"
+        unit = "N m, deg/s" if all(joint.revolute for joint in self.arm.joints) else "N m or N, deg/s or mm/s"
         yield ResultTable(
-            title="Reducers and bearings, first to fail in front",
-            heads=("joint", f"mean, {unit}", "RMS", "peak", "speed, deg/s", "of rated", "hours", "cycles"),
+            title=f"Reducers and bearings, first to fail in front ({unit})",
+            heads=("joint", "mean", "RMS", "peak", "speed", "of rated", "hours", "cycles"),
             rows=rows,
             numbers=range(1, 8),
             exceeded=over,
@@ -372,7 +372,7 @@ def _curve(life: ArmLife, play: PlayLife, first: Array, rates: Array) -> tuple[A
 
 
 def _count(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else "endless"
+    return f"{value:.3g}" if np.isfinite(value) else "endless"
 
 
 def _finite(value: float) -> float | None:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator
 
-import attrs
 import numpy as np
 
 from armwright.reliability.arm_life import ArmLife
@@ -22,7 +21,7 @@ def life_files(life: ArmLife, *, command: str) -> dict[str, str]:
     drawn = list(_drawings(life))
     exceeded = any(one.exceeded for one in life.components)
     beside = {"life.json": "loads and lives of every component, and cycles until the limit"}
-    cards = [Card(table.title, tables([attrs.evolve(table, title="")])) for table in life.tables() if table.rows]
+    cards = [Card("Life", tables(life.tables()))]
     if drawn:
         cards.append(Card("Figures", figures(drawn)))
     names = {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn}
