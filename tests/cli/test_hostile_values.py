@@ -72,6 +72,7 @@ CALLS: dict[str, list[str]] = {
     "clearance estimate": ["five-bar", "rest.csv", "--json"],
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],
     "tolerance": ["puma560", "tolerances.toml", "-q", Q, "--limit", "0.5", "--samples", "20", "--json"],
+    "vibration": ["ur5", "-q", Q, "--stiffness", "1e4", "--json"],
     "study": ["stanford-torque", "--json"],
     "kernel": ["ur5", "forward", "--json"],
 }

@@ -38,6 +38,7 @@ COMMANDS = {
     "plan-excitation": "Plan a motion from which masses, inertias and friction of an arm can be identified.",
     "identify": "Identify masses, inertias and friction of an arm from logs of its motions.",
     "tolerance": "Print how far tolerances of an arm's dimensions move its tool, with probabilities, and what to tighten or relax.",
+    "vibration": "Print natural frequencies of an arm on the springs of its gears, and how far its tool yields.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
     "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",
