@@ -163,8 +163,10 @@ def smooth_move(
         before, frequencies, bounds = planned, np.zeros(0), None
     else:
         found = modes(solver.arm, planned(np.linspace(0, planned.duration, _MEAN)))
-        k = min(integer(count, "count", least=1), found.frequencies.shape[-1])
-        frequencies, damping = (each.mean(axis=0)[:k] for each in (found.frequencies, found.damping))
+        frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
+        # What is damped more creeps to its place.
+        slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
+        frequencies, damping = frequencies[slowest], damping[slowest]
         pairs = zip(frequencies.tolist(), damping.tolist(), strict=True)
         by = combined([shaper(smoothing, f, z, tolerance=tolerance) for f, z in pairs])
         legs, parts = _shaped_legs(arm, _legs(move), by)

@@ -51,7 +51,9 @@ def _drawings(assessment: VibrationAssessment) -> Iterator[Drawing]:
     if len(assessment.q) > 1:
         frequencies = {f"mode {i + 1}": f for i, f in enumerate(assessment.modes.frequencies.T)}
         yield Drawing(
-            "frequencies", "frequencies along the motion", _along(assessment, frequencies, "frequency, Hz", log=True)
+            "frequencies",
+            "frequencies along the motion",
+            _along(assessment, frequencies, "Frequencies along the motion", "frequency, Hz"),
         )
         lengths = {"at rest": np.linalg.norm(assessment.at_rest, axis=1) * 1e3}
         if assessment.moving:
@@ -59,24 +61,24 @@ def _drawings(assessment: VibrationAssessment) -> Iterator[Drawing]:
         yield Drawing(
             "deflection",
             "deflection of the tool along the motion",
-            _along(assessment, lengths, "deflection of the tool, mm", log=False),
+            _along(assessment, lengths, "Deflection of the tool", "deflection, mm"),
         )
 
 
-def _along(assessment: VibrationAssessment, curves: dict[str, Array], label: str, *, log: bool) -> str:
+def _along(assessment: VibrationAssessment, curves: dict[str, Array], title: str, label: str) -> str:
     figure = empty_figure((7.4, 3.6))
     axes = plain_axes(figure, "configuration", label)
     for name, values in curves.items():
         axes.plot(assessment.numbers, values, label=name)
-    if log:
+    if "Hz" in label:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter("{x:g}")
         low, high = axes.get_ylim()
         axes.yaxis.set_minor_formatter("{x:g}" if high < 10 * low else "")
     else:
         axes.set_ylim(bottom=0)
-    axes.legend(fontsize="small")
-    return svg_text(figure, label.capitalize())
+    axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return svg_text(figure, title)
 
 
 def _shapes(assessment: VibrationAssessment) -> str:
@@ -91,5 +93,5 @@ def _shapes(assessment: VibrationAssessment) -> str:
         axes.bar(np.arange(1, n + 1) + (i - (count - 1) / 2) * width, scaled, width, label=f"{f:.2f} Hz")
     axes.set_xticks(np.arange(1, n + 1))
     axes.axhline(0, color="C7", linewidth=1)
-    axes.legend(fontsize="small")
+    axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.01, 0.5))
     return svg_text(figure, f"Shapes of the modes at configuration {assessment.numbers[p]}")
