@@ -72,6 +72,8 @@ examples: $(VENV)/examples   ## Run every example into out/
 	$(BIN)/armwright run examples/stack_by_vision.rlo --cell examples/vision_cell.toml --physics --seed 1 -o out/stack_by_vision
 	$(BIN)/armwright move joint puma560-seed examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
+	$(BIN)/armwright vibration examples/two_link_springs.toml -q 57.3,68.75 -o out/vibration
+	$(BIN)/armwright move joint examples/two_link_springs.toml examples/two_link_poses.toml --smooth zvd -o out/smooth
 	$(BIN)/python examples/measurements.py out
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
 	$(BIN)/python examples/five_bar.py out

@@ -75,6 +75,8 @@ angle = st.floats(-1e12, 1e12)
         coulomb_forward=positive,
         coulomb_backward=positive,
         gear_ratio=positive,
+        stiffness=bound,
+        damping=positive,
     ),
     texts=st.tuples(*[st.text(st.characters(exclude_categories=["Cs"]))] * 3),
 )

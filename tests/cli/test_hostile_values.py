@@ -73,6 +73,7 @@ CALLS: dict[str, list[str]] = {
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],
     "tolerance": ["puma560", "tolerances.toml", "-q", Q, "--limit", "0.5", "--samples", "20", "--json"],
     "life": ["puma560", "efforts.csv", "life.toml", "--limit", "0.1", "--samples", "20", "--json"],
+    "vibration": ["ur5", "-q", Q, "--stiffness", "1e4", "--json"],
     "study": ["stanford-torque", "--json"],
     "kernel": ["ur5", "forward", "--json"],
 }

@@ -155,6 +155,7 @@ def _drive_table(model: Arm) -> ResultTable:
     # Terms that few arms have are shown where there are some.
     names = {"offset": "offset", "Stribeck friction": "stribeck", "cube-root friction": "cube_root"}
     others = [head for head, name in names.items() if model.motor_values(name).any()]
+    flexible = bool(np.isfinite(model.motor_values("stiffness")).any())
     for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
         forward, backward, units = motor.coulomb_forward, motor.coulomb_backward, joint.units
         coulomb = f"{forward:g}" if forward == backward else f"+{forward:g} / -{backward:g}"
@@ -163,11 +164,13 @@ def _drive_table(model: Arm) -> ResultTable:
         if motor.stribeck:
             values["Stribeck friction"] += f", exp(-(v / {_position(joint, motor.stribeck_speed, '/s')})²)"
         more = [values[head] for head in others]
-        rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, *more, f"{motor.gear_ratio:g}"))
+        gear = [f"{motor.stiffness:g} {units.stiffness}", f"{motor.damping:g} {units.viscous}"] if flexible else []
+        rows.append((str(i), f"{motor.inertia:g} {units.inertia}", *friction, *more, f"{motor.gear_ratio:g}", *gear))
     what, title = "joint", "Drives, reflected to the joint"
     if model.coupling is not None:
         what, title = "drive", "Drives, behind their gears"
-    heads = (what, "inertia", "viscous", "Coulomb friction", *others, "gear ratio")
+    gear_heads = ("stiffness", "damping") if flexible else ()
+    heads = (what, "inertia", "viscous", "Coulomb friction", *others, "gear ratio", *gear_heads)
     return ResultTable(title=title, heads=heads, rows=rows)
 
 

@@ -63,6 +63,9 @@ class Motor:
         stribeck_speed: speed at which 1/e of that is left [rad/s] or [m/s].
         cube_root: friction that grows with the cube root of the speed, at 1 rad/s or 1 m/s [N m] or [N].
         gear_ratio: turns of the motor per turn of the joint; for information, ``inertia`` has it already.
+        stiffness: of the gear between motor and link [N m/rad] or [N/m]; infinite for a rigid one. Only vibration and
+            flexible joints know it: everything else moves the link as the motor moves.
+        damping: of the gear beside it, by the difference of the velocities at its ends [N m s/rad] or [N s/m].
 
     Source:
         Armstrong-Hélouvry, Dupont & Canudas de Wit (1994), section 2, for Stribeck's curve.
@@ -77,11 +80,14 @@ class Motor:
     stribeck_speed: float = 0.0
     cube_root: float = 0.0
     gear_ratio: float = 1.0
+    stiffness: float = math.inf
+    damping: float = 0.0
 
     def __attrs_post_init__(self) -> None:
         """Refuse drives that give energy for nothing."""
         magnitudes = ("inertia", "viscous", "coulomb_forward", "coulomb_backward", "stribeck", "cube_root")
-        check_numbers(self, "motor", (*magnitudes, "stribeck_speed"), "0 or more")
+        check_numbers(self, "motor", (*magnitudes, "stribeck_speed", "damping"), "0 or more")
+        check_numbers(self, "motor", ("stiffness",), "above 0")
         check_numbers(self, "motor", ("offset",), "finite")
         check_numbers(self, "motor", ("gear_ratio",))
         if self.stribeck and not self.stribeck_speed:

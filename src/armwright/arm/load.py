@@ -363,6 +363,8 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
         stribeck=stribeck,
         stribeck_speed=stribeck_speed,
         cube_root=table.number(f"cube_root_{force}", default=0.0, lower=0.0),
+        stiffness=table.positive("stiffness_Nm_per_rad" if revolute else "stiffness_N_per_m", default=math.inf),
+        damping=table.number("damping_Nms" if revolute else "damping_Ns_per_m", default=0.0, lower=0.0),
     )
     table.refuse_unknown_keys()
     return motor

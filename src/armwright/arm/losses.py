@@ -26,6 +26,8 @@ def lost_of_joint(arm: Arm, index: int) -> Iterator[str]:
             f"{label}: Coulomb friction of {forward:g} {units.effort} forward and {backward:g} {units.effort} backward "
             f"is {mean:g} {units.effort} in both directions in the file"
         )
+    if math.isfinite(motor.stiffness):
+        yield f"{label}: the stiffness of its gear, {motor.stiffness:g} {units.stiffness}, is not in the file"
     terms = {"offset": motor.offset, "Stribeck term": motor.stribeck, "cube-root term": motor.cube_root}
     for name, value in terms.items():
         if value:

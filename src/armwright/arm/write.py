@@ -215,8 +215,10 @@ def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
         f"stribeck_{dry}": motor.stribeck,
         f"stribeck_speed_{speed}": motor.stribeck_speed,
         f"cube_root_{dry}": motor.cube_root,
+        "stiffness_Nm_per_rad" if joint.revolute else "stiffness_N_per_m": motor.stiffness,
+        f"damping_{viscous}": motor.damping,
     }
-    values = {key: value for key, value in values.items() if value}
+    values = {key: value for key, value in values.items() if value and math.isfinite(value)}
     return values if motor.gear_ratio == 1 else {**values, "gear_ratio": motor.gear_ratio}
 
 

@@ -39,6 +39,7 @@ COMMANDS = {
     "identify": "Identify masses, inertias and friction of an arm from logs of its motions.",
     "tolerance": "Print how far tolerances of an arm's dimensions move its tool, with probabilities, and what to tighten or relax.",
     "life": "Print how long the reducers, bearings and the repeatability of an arm last that repeats a motion.",
+    "vibration": "Print natural frequencies of an arm on the springs of its gears, and how far its tool yields.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
     "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",

@@ -8,6 +8,14 @@ from .derivatives import (
 )
 from .energy import kinetic_energy as kinetic_energy, potential_energy as potential_energy
 from .equation_of_motion import Terms as Terms, terms as terms
+from .flexible_joints import (
+    Modes as Modes,
+    deflection as deflection,
+    gear_efforts as gear_efforts,
+    modes as modes,
+    tool_compliance as tool_compliance,
+    with_gears as with_gears,
+)
 from .identification import (
     BaseParameters as BaseParameters,
     base_parameters as base_parameters,
@@ -24,3 +32,4 @@ from .newton_euler import LinkForces as LinkForces, inverse_dynamics as inverse_
 from .payloads import payload as payload
 from .regressors import dynamic_parameters as dynamic_parameters, regressor as regressor
 from .shares import coriolis_efforts as coriolis_efforts, gravity_efforts as gravity_efforts
+from .vibration import VibrationAssessment as VibrationAssessment, assess_vibration as assess_vibration

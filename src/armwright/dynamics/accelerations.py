@@ -53,7 +53,7 @@ def forward_dynamics(
         Featherstone (2008), section 7.3.
     """
     lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
-    model = arm if drives else _without_drives(arm)
+    model = arm if drives else without_drives(arm)
     driving = less_springs(model, less_friction(model, qd_, tau_), q_)
     if not lead:
         # A division by zero must raise no error here: the check of the pivots reports it.
@@ -118,7 +118,7 @@ def toacc(
         TR-83-008, appendix V, subroutine TOACC; Walker & Orin (1982), method 1.
     """
     lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
-    model = arm if drives else _without_drives(arm)
+    model = arm if drives else without_drives(arm)
     D = stack_matrix(unit_accelerations(model, q_), lead)
     bias = newton_euler(model, q_, qd_, [0.0] * arm.n, push)
     driving = less_springs(model, less_friction(model, qd_, tau_), q_)
@@ -174,5 +174,6 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
             )
 
 
-def _without_drives(arm: Arm) -> Arm:
+def without_drives(arm: Arm) -> Arm:
+    """Return an arm whose drives neither weigh nor rub."""
     return attrs.evolve(arm, motors=[Motor()] * arm.n, coupling=None)

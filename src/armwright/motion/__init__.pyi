@@ -11,6 +11,7 @@ from .controlled_stop import brake as brake
 from .cubic_polynomials import cubic as cubic, cubic_through as cubic_through
 from .detour import Detour as Detour, line_or_detour as line_or_detour
 from .efforts import effort_peaks as effort_peaks, slowing_for_efforts as slowing_for_efforts
+from .flat_feedforward import FlatMotion as FlatMotion, flat_motion as flat_motion, ninth as ninth
 from .limit_utilization import limit_use as limit_use, slowing_for_limits as slowing_for_limits
 from .moves import (
     Move as Move,
@@ -21,6 +22,13 @@ from .moves import (
 from .obstruction import PathError as PathError
 from .online import OnlineError as OnlineError, replace_goal as replace_goal, retarget as retarget
 from .quintic_polynomials import point_to_point as point_to_point, quintic as quintic
+from .shaping import Shaper as Shaper, combined as combined, shaped as shaped, shaper as shaper
+from .smooth_move import (
+    Settling as Settling,
+    SmoothMove as SmoothMove,
+    settling as settling,
+    smooth_move as smooth_move,
+)
 from .straight import straight_line as straight_line
 from .through import through_frames as through_frames
 from .time_optimal_path import TimeOptimal as TimeOptimal, time_optimal as time_optimal

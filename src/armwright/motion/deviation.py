@@ -16,10 +16,12 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, read_only
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.polynomials import evaluate
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
+from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 from armwright.tracing.loops import Loops, Runner, Table
 from armwright.tracing.scalar import Scalar, larger, select, smaller, sqrt
 from armwright.tracing.vectors import Matrix, dot
@@ -33,6 +35,8 @@ _SAMPLES = (4, 200)
 _LEG_SAMPLES, _MAX_LEG_SAMPLES, _LEG_ADDED = 8, 128, 0.1
 # A distance below this is not sampled more closely [m].
 _SMALL = 1e-9
+# Of the distance of any polynomials from a line: longest step between two samples [s].
+_LINE_STEP = 1e-3
 # Positions of the tool and entries of its rotation are computed to so many roundings.
 ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
@@ -438,3 +442,49 @@ def _leg_distance(p: Array, A: Array, B: Array) -> Array:
     square = np.einsum("mi,mi->m", leg, leg)
     along = np.clip(np.einsum("lmi,mi->lm", p - A, leg) / np.where(square > 0, square, 1.0), 0.0, 1.0)
     return np.asarray(np.linalg.norm(p - A - along[..., None] * leg, axis=-1))
+
+
+def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> Tolerance:
+    """Return upper bounds of how far the tool is from a straight line, and from the orientation that belongs there.
+
+    The motion may be polynomials of any degree. Between samples a time d apart position and orientation leave their
+    chords by no more than d²/8 times their greatest second derivatives.
+
+    Args:
+        arm: with n joints.
+        trajectory: of them.
+        A: (4, 4) pose of the tool at which the line begins.
+        B: (4, 4) pose at which it ends.
+    """
+    tool, speed = _tool_bounds(arm, trajectory)
+    shift = B[:3, 3] - A[:3, 3]
+    length = float(np.linalg.norm(shift))
+    turn = rotation_vector(A[:3, :3].T @ B[:3, :3])
+    angle = float(np.linalg.norm(turn))
+    per_metre = angle / length if length > _SMALL else 0.0
+    bend = half_angle_bound(
+        tool.angular_speed, tool.angular_acceleration, per_metre * tool.acceleration, per_metre * speed
+    )
+    h = trajectory.lengths
+    count = max(_SAMPLES[0], math.ceil(float(h.max()) / _LINE_STEP))
+    q = np.stack([evaluate(trajectory.coefficients, (part * h)[:, None]) for part in np.arange(count + 1) / count])
+    X = np.asarray(forward(arm, q))
+    p = X[..., :3, 3] - A[:3, 3]
+    along = p @ shift / max(length**2, _SMALL**2)
+    away = np.linalg.norm(p - np.clip(along, 0, 1)[..., None] * shift, axis=-1).max(axis=0)
+    due = A[:3, :3] @ rotation_from_vector(along[..., None] * turn)
+    sines = half_sines(due, X[..., :3, :3]).max(axis=0)
+    between = (h / count) ** 2 / 8
+    sine = float((sines + between * bend).max())
+    return Tolerance(float((away + between * tool.acceleration).max()), 2 * math.asin(min(sine, 1.0)))
+
+
+def _tool_bounds(arm: Arm, trajectory: Trajectory) -> tuple[ToolBounds, Array]:
+    """Return bounds of how the tool moves on polynomials of any degree, and of the speed of its origin, (m,)."""
+    lever = _levers(arm, trajectory.coefficients, trajectory.lengths)
+    rotates, pairs = _rotating(tuple(arm.revolute.tolist()))
+    speed, acceleration = trajectory.segment_peaks(1), trajectory.segment_peaks(2)
+    together = pairs[0] * lever + pairs[1] * lever[:, None] + pairs[2]
+    a_tool = acceleration @ lever + np.einsum("mj,jk,mk->m", speed, together, speed)
+    alpha = acceleration @ rotates + np.einsum("mj,jk,mk->m", speed, pairs[3], speed)
+    return ToolBounds(a_tool, speed @ rotates, alpha), speed @ lever

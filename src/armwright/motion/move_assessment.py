@@ -13,6 +13,7 @@ from armwright.files.result_table import ResultTable
 from armwright.motion.certificate import LimitName
 from armwright.motion.limit_utilization import ROUNDING, limit_use
 from armwright.motion.moves import Move
+from armwright.motion.smooth_move import SmoothMove
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -22,11 +23,13 @@ class MoveAssessment:
     Attributes:
         move: the move.
         names: names of the poses.
+        smooth: how it leaves little vibration; None where nothing was asked for.
         uses: the utilization of each limit by every joint, (n,).
     """
 
     move: Move
     names: tuple[str, ...]
+    smooth: SmoothMove | None = None
     uses: dict[LimitName, Array] = attrs.field(init=False)
 
     @uses.default
@@ -44,6 +47,8 @@ class MoveAssessment:
             notes.append(f"the masses of {move.arm.name} are unknown, and so are its efforts")
         if move.certificate:
             notes.append(f"certificate {move.certificate}")
+        if self.smooth is not None:
+            notes += self.smooth.notes
         for start, end, detour in zip(self.names, self.names[1:], move.detours, strict=False):
             bypass = f"line infeasible, {detour.obstacle}; detour by {detour.method}"
             notes.append(f"{start} to {end}: {'a line' if detour.method == 'line' else bypass}: {detour.price}")
@@ -63,6 +68,7 @@ class MoveAssessment:
             "branch": move.label,
             "poses": [dict(zip(("name", "time", "q", "deviation"), each, strict=True)) for each in self._passages()],
             "certificate": None if move.certificate is None else move.certificate.as_data(),
+            "vibration": None if self.smooth is None else self.smooth.as_data(),
             "of_limits": {name: use.tolist() for name, use in self.uses.items()},
             "segments": [
                 {
@@ -104,3 +110,5 @@ class MoveAssessment:
             section_ends=(len(self.names) - 1,),
             remark=f"{', '.join(first)} and {last} in percent of their limits",
         )
+        if self.smooth is not None:
+            yield self.smooth.table()

@@ -6,6 +6,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.files.rows import text_cell
+from armwright.simulation.flexible_joints import FlexibleSimulation
 
 
 def motion_csv(t: Array, q: Array, qd: Array, qdd: Array, tau: Array) -> Iterator[str]:
@@ -22,6 +23,17 @@ def motion_csv(t: Array, q: Array, qd: Array, qdd: Array, tau: Array) -> Iterato
     columns = {f"{name}{i + 1}": values[:, i] for name, values in quantities.items() for i in range(q.shape[1])}
     # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
     return csv_lines({"t": t, **columns}, 12)
+
+
+def flexible_motion_files(simulation: FlexibleSimulation) -> dict[str, Iterator[str]]:
+    """Return motion.csv of the links, and motors.csv of the motors behind their gears, in SI."""
+    s = simulation
+    motors = {"motor": s.motors, "motor_speed": s.motor_speeds, "gear": s.gears}
+    columns = {f"{name}{i + 1}": values[:, i] for name, values in motors.items() for i in range(s.q.shape[1])}
+    return {
+        "motion.csv": motion_csv(s.t, s.q, s.qd, s.qdd, s.tau),
+        "motors.csv": csv_lines({"t": s.t, **columns}, 12),
+    }
 
 
 def csv_lines(columns: Mapping[str, Array], digits: int) -> Iterator[str]:

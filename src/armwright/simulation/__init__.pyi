@@ -6,6 +6,10 @@ from .controllers import (
     pd as pd,
     pd_with_gravity as pd_with_gravity,
 )
+from .flexible_joints import (
+    FlexibleSimulation as FlexibleSimulation,
+    simulate_flexible as simulate_flexible,
+)
 from .integrators import Adaptive as Adaptive, Gill as Gill
 from .plant import Plant as Plant
 from .result import Event as Event, JointState as JointState, Simulation as Simulation, Status as Status

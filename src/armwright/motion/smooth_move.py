@@ -1,0 +1,325 @@
+"""Moves of arms with flexible gears that leave little vibration: by input shapers, or by flat feedforward."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, integer
+from armwright.dynamics.flexible_joints import deflection, modes
+from armwright.errors import IncapableArmError, InvalidValueError, one_of
+from armwright.files.result_table import ResultTable
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.certificate import slowing
+from armwright.motion.deviation import distance_from_line
+from armwright.motion.flat_feedforward import FlatMotion, flat_motion, ninth
+from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
+from armwright.motion.moves import Move
+from armwright.motion.shaping import Shaper, combined, shaped, shaper
+from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.tolerance import Tolerance
+from armwright.motion.trajectory import Trajectory, join
+from armwright.simulation.flexible_joints import simulate_flexible
+from armwright.simulation.integrators import Adaptive
+from armwright.simulation.result import Status
+
+Smoothing: TypeAlias = Literal["zv", "zvd", "ei", "flat"]
+# Configurations at which frequencies are computed, and at which paths are compared.
+_MEAN, _COMPARED = 101, 2001
+# Rounds in which a move is slowed until it keeps its limits, and what more it is slowed by.
+_ROUNDS, _MORE = 30, 1e-3
+# After its end an arm is watched for so many periods of its lowest mode, within these times [s].
+_WATCHED, _WATCH = 5.0, (0.2, 10.0)
+# An arm is at rest when its tool stays so near to its end [m].
+_AT_REST = 1e-4
+# An end of a move is at rest where nothing is faster [rad/s], [m/s].
+_STANDS = 1e-9
+
+
+class Settling(NamedTuple):
+    """How the tool comes to rest, the motors guided by a stiff servo.
+
+    Attributes:
+        residual: its largest distance, after the motors stand, from where it comes to rest [m].
+        time: from which on it stays within 0.1 mm of that, since the start of the move [s]; None where it does not
+            while it is watched.
+    """
+
+    residual: float
+    time: float | None
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class SmoothMove:
+    """A move whose motors are commanded so that the arm vibrates little.
+
+    Attributes:
+        move: with the command of the motors as its trajectory.
+        smoothing: how.
+        frequencies: (k,) mean along the move, of the modes that are shaped [Hz]; none by flat feedforward.
+        added: how much longer the move takes than it did [s].
+        deviation: the largest distance of the tool from the path of the move as it was, seen at samples, on rigid
+            gears; by flat feedforward that of the links [m].
+        line: bounds of the distance and the angle of the tool from its straight lines, and what is allowed; None where
+            no line was asked for.
+        before: how the tool came to rest after the move as it was.
+        after: how it comes to rest now.
+        softer: the same with gears of 20 % less stiffness than the arm is known by.
+    """
+
+    move: Move
+    smoothing: Smoothing
+    frequencies: Array
+    added: float
+    deviation: float
+    line: tuple[Tolerance, Tolerance] | None
+    before: Settling
+    after: Settling
+    softer: Settling
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the command is."""
+        notes = ["the motion is that of the motors behind their gears"]
+        if self.smoothing == "flat":
+            notes.append("the joints stop at every pose")
+        if self.line is not None:
+            found, allowed = self.line
+            notes.append(
+                f"straight lines are kept within {found.position * 1e3:.3f} of {allowed.position * 1e3:g} mm and "
+                f"{found.orientation * 1e3:.3f} of {allowed.orientation * 1e3:g} mrad"
+            )
+        return tuple(notes)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data in SI units."""
+        return {
+            "smoothing": self.smoothing,
+            "frequencies_hz": self.frequencies.tolist(),
+            "added_s": self.added,
+            "path_deviation_m": self.deviation,
+            "line": None if self.line is None else self.line[0]._asdict(),
+            **{name: getattr(self, name)._asdict() for name in ("before", "after", "softer")},
+        }
+
+    def table(self) -> ResultTable:
+        """Return the table of vibrations before and after."""
+        rows = []
+        for name, settling in (("as it was", self.before), ("now", self.after), ("gears 20 % softer", self.softer)):
+            time = "later" if settling.time is None else f"{settling.time:.3f}"
+            rows.append((name, f"{settling.residual * 1e3:.4f}", time))
+        shaped_modes = ", ".join(f"{f:.2f} Hz" for f in self.frequencies)
+        how = f"{self.smoothing.upper()} for {shaped_modes}" if shaped_modes else "flat feedforward"
+        return ResultTable(
+            title=f"Vibration of the tool, {how}",
+            heads=("move", "residual mm", "within 0.1 mm at s"),
+            rows=rows,
+            numbers=(1, 2),
+            remark=f"{self.added:+.3f} s; path deviation {self.deviation * 1e3:.4f} mm",
+        )
+
+
+def smooth_move(
+    arm: AnyArm, move: Move, smoothing: Smoothing, *, allowed: Tolerance, count: int = 2, tolerance: float = 0.05
+) -> SmoothMove:
+    """Return a move that leaves little vibration; it keeps the limits of speed, acceleration and effort.
+
+    Shapers take the mean frequencies and damping along the move. Between poses at which the arm stops, every leg is
+    shaped for itself.
+
+    Args:
+        arm: the arm, or a compiled one.
+        move: of that arm, from rest to rest.
+        smoothing: ``zv``, ``zvd`` or ``ei``, see ``shaper``; ``flat``, see ``flat_motion``.
+        allowed: distance and angle of the tool from straight lines.
+        count: how many modes are shaped, the slowest ones.
+        tolerance: of ``ei``.
+
+    Raises:
+        UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
+        InvalidValueError: the move starts or ends in motion, a straight line would be left, or a path of the tool
+            cannot be run that way.
+        IncapableArmError: no slowing keeps the limits.
+    """
+    one_of("smoothing", smoothing, get_args(Smoothing))
+    solver = solver_of(arm)
+    planned = move.trajectory
+    ends = planned(np.array((0.0, planned.duration)), 1)
+    if np.abs(ends).max() > _STANDS:
+        raise InvalidValueError("ends: a move that leaves no vibration starts and ends at rest; expected ends at rest")
+    straight = bool(move.tool_path or move.detours)
+    if smoothing == "flat":
+        if straight:
+            raise InvalidValueError(
+                "flat feedforward needs four derivatives of the joints, and straight lines of the tool have two; "
+                "expected a joint move, or zv, zvd or ei"
+            )
+        flats = _flat_legs(solver.arm, move)
+        command, links = join([each.motors for each in flats], gap=1e-5), join([each.links for each in flats])
+        lengths = [each.links.duration for each in flats]
+        before, frequencies, bounds = planned, np.zeros(0), None
+    else:
+        found = modes(solver.arm, planned(np.linspace(0, planned.duration, _MEAN)))
+        frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
+        # What is damped more creeps to its place.
+        slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
+        frequencies, damping = frequencies[slowest], damping[slowest]
+        pairs = zip(frequencies.tolist(), damping.tolist(), strict=True)
+        by = combined([shaper(smoothing, f, z, tolerance=tolerance) for f, z in pairs])
+        legs, parts = _shaped_legs(arm, _legs(move), by)
+        command = links = join(parts)
+        before, lengths = join(legs), [each.duration for each in parts]
+        bounds = _straight(solver.arm, move, parts, smoothing, allowed) if straight else None
+    times = np.append(0.0, np.cumsum(lengths))
+    passing = np.zeros(len(move.times))
+    if len(times) != len(move.times):
+        # One leg through all poses: of each the delayed time, and the distance in the space of the joints.
+        times = np.clip(move.times * before.duration / planned.duration + (by.parts @ by.delays), 0, command.duration)
+        times[[0, -1]] = 0.0, command.duration
+        passing = _passing(command, move.configurations)
+    final = attrs.evolve(
+        move, trajectory=command, times=times, passing_distances=passing, tool_path=None, certificate=None, detours=()
+    )
+    softer = attrs.evolve(
+        solver.arm,
+        motors=[attrs.evolve(motor, stiffness=0.8 * motor.stiffness) for motor in solver.arm.motors],
+    )
+    return SmoothMove(
+        move=final,
+        smoothing=smoothing,
+        frequencies=frequencies,
+        added=command.duration - planned.duration,
+        deviation=_path_deviation(solver.arm, planned, links),
+        line=None if bounds is None else (bounds, allowed),
+        before=settling(solver.arm, before),
+        after=settling(solver.arm, command),
+        softer=settling(softer, command),
+    )
+
+
+def settling(arm: Arm, motors: Trajectory) -> Settling:
+    """Return how the tool comes to rest after a motion of the motors, by simulation with flexible gears.
+
+    Args:
+        arm: with n joints, of which some have flexible gears.
+        motors: their motion behind the gears, from rest; the links start in equilibrium.
+
+    Raises:
+        UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
+        IncapableArmError: the simulation fails.
+    """
+    end = _at_rest(arm, motors(motors.duration))
+    watched = float(np.clip(_WATCHED / modes(arm, end).frequencies[0], *_WATCH))
+    run = simulate_flexible(
+        arm,
+        _at_rest(arm, motors(0.0)),
+        duration=motors.duration + watched,
+        motors=motors,
+        integrator=Adaptive(rtol=1e-6, atol=1e-8),
+        period=2e-3,
+    )
+    if run.status is not Status.FINISHED:
+        raise IncapableArmError(f"the simulation with flexible gears ended at {run.t[-1]:.3f} s: {run.status.value}")
+    distance = np.linalg.norm(forward(arm, run.q)[:, :3, 3] - forward(arm, end)[:3, 3], axis=1)
+    far = np.flatnonzero(distance > _AT_REST)
+    last = int(far[-1]) + 1 if len(far) else 0
+    after = run.t >= motors.duration - 1e-9
+    return Settling(float(distance[after].max()), float(run.t[last]) if last < len(run.t) else None)
+
+
+def _at_rest(arm: Arm, theta: Array) -> Array:
+    """Return where the links stand on their gears when the motors stand at theta (n,)."""
+    q = theta
+    for _ in range(100):
+        q, last = theta + deflection(arm, q), q
+        if np.abs(q - last).max() < 1e-14:
+            break
+    return q
+
+
+def _legs(move: Move) -> list[Trajectory]:
+    """Return the parts of a move between its stops."""
+    return [detour.trajectory for detour in move.detours] or [move.trajectory]
+
+
+def _shaped_legs(arm: AnyArm, legs: list[Trajectory], by: Shaper) -> tuple[list[Trajectory], list[Trajectory]]:
+    """Return legs, slowed where their efforts ask for it, as they are and shaped."""
+    for _ in range(_ROUNDS):
+        parts = [shaped(leg, by) if leg.duration else leg for leg in legs]
+        factor, _because = slowing_for_limits(arm, join(parts))
+        if factor <= 1 + ROUNDING:
+            return legs, parts
+        legs = [leg.slowed(factor * (1 + _MORE)) for leg in legs]
+    raise IncapableArmError("no slower motion keeps its limits when it is shaped")
+
+
+def _flat_legs(arm: Arm, move: Move) -> list[FlatMotion]:
+    """Return legs of order 9 from pose to pose that keep the limits of links and motors."""
+    legs = []
+    limits = arm.limits
+    for start, goal, planned in zip(move.configurations, move.configurations[1:], np.diff(move.times), strict=False):
+        duration = float(planned)
+        for _ in range(_ROUNDS):
+            links = ninth(start, goal, duration)
+            factor, _because = slowing_for_limits(arm, links)
+            if factor <= 1 + ROUNDING:
+                leg = flat_motion(arm, links)
+                efforts = float((np.abs(leg.efforts) / limits.effort).max())
+                factor = max(slowing(arm, leg.motors)[0], efforts**0.5)
+                if factor <= 1 + ROUNDING:
+                    legs.append(leg)
+                    break
+            duration *= factor * (1 + _MORE)
+        else:
+            raise IncapableArmError(
+                f"from pose {len(legs) + 1} to pose {len(legs) + 2} no slower motion of the motors keeps their limits"
+            )
+    return legs
+
+
+def _straight(arm: Arm, move: Move, parts: list[Trajectory], smoothing: Smoothing, allowed: Tolerance) -> Tolerance:
+    """Return bounds of how far shaped legs are from straight lines of the tool.
+
+    Raises:
+        InvalidValueError: they are farther than allowed, or no lines from stop to stop.
+    """
+    if len(parts) != len(move.poses) - 1:
+        raise InvalidValueError(
+            f"a path of the tool past {len(move.poses) - 2} poses without a stop cannot be shaped; expected two poses, "
+            "or a stop at each (--around)"
+        )
+    worst = Tolerance(0.0, 0.0)
+    for i, part in enumerate(parts):
+        if move.detours and move.detours[i].method != "line":
+            raise InvalidValueError(f"the detour from pose {i + 1} to pose {i + 2} cannot be shaped; expected a line")
+        found = distance_from_line(arm, part, move.poses[i], move.poses[i + 1])
+        if found.position > allowed.position or found.orientation > allowed.orientation:
+            raise InvalidValueError(
+                f"shaped by {smoothing}, the straight line from pose {i + 1} to pose {i + 2} would be left by up to "
+                f"{found.position * 1e3:.3g} mm and {found.orientation * 1e3:.3g} mrad; {allowed.position * 1e3:g} mm "
+                f"and {allowed.orientation * 1e3:g} mrad are allowed. A slower move, zv or fewer modes keep nearer; "
+                "--deviation-mm allows more"
+            )
+        worst = Tolerance(*(max(pair) for pair in zip(worst, found, strict=True)))
+    return worst
+
+
+def _passing(command: Trajectory, configurations: Array) -> Array:
+    """Return how near a motion passes configurations in the space of the joints, (k,), at samples."""
+    q = command(np.linspace(0, command.duration, _COMPARED))
+    return np.array([np.linalg.norm(q - each, axis=1).min() for each in configurations])
+
+
+def _path_deviation(arm: Arm, planned: Trajectory, links: Trajectory) -> float:
+    """Return the largest distance of the tool from the path that was planned, at samples."""
+    place, there = (forward(arm, each(np.linspace(0, each.duration, _COMPARED)))[:, :3, 3] for each in (planned, links))
+    starts, chords = place[:-1], np.diff(place, axis=0)
+    squares = np.maximum((chords**2).sum(axis=1), 1e-300)
+    worst = 0.0
+    for p in there:
+        part = np.clip(((p - starts) * chords).sum(axis=1) / squares, 0, 1)
+        worst = max(worst, float(np.linalg.norm(p - starts - part[:, None] * chords, axis=1).min()))
+    return worst
