@@ -24,3 +24,8 @@ from .newton_euler import LinkForces as LinkForces, inverse_dynamics as inverse_
 from .payloads import payload as payload
 from .regressors import dynamic_parameters as dynamic_parameters, regressor as regressor
 from .shares import coriolis_efforts as coriolis_efforts, gravity_efforts as gravity_efforts
+from .static_deflection import (
+    StaticDeflection as StaticDeflection,
+    joint_loads as joint_loads,
+    static_deflection as static_deflection,
+)
