@@ -111,9 +111,7 @@ class Chain:
         of_joints = [error.axis == 2 and not self.arm.joints[error.joint].revolute for error in self.joint_errors]
         return np.array([*lengths, *of_joints], dtype=np.bool_)
 
-    def forward(
-        self, q: ArrayLike, errors: ArrayLike | None = None, *, payload: ArrayLike | None = None
-    ) -> ToolPoses:
+    def forward(self, q: ArrayLike, errors: ArrayLike | None = None, *, payload: ArrayLike | None = None) -> ToolPoses:
         """Return the poses of the tool, and their derivatives.
 
         Args:

@@ -60,7 +60,9 @@ def measured_columns(arm: Arm) -> Schema:
         joint = re.match(r"joint_\d", name)
         return f"{arm.name} has {arm.n} joints; is this a measurement of another arm?" if joint else ""
 
-    return Schema(columns=(*joints, *points, *angles, *others, distance, *payload, *deviations, *words), explain=explain)
+    return Schema(
+        columns=(*joints, *points, *angles, *others, distance, *payload, *deviations, *words), explain=explain
+    )
 
 
 def read_columns(

@@ -27,7 +27,16 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
-from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, PAYLOAD, RPY, joint_columns, read_columns
+from armwright.calibration.columns import (
+    DEVIATIONS,
+    DISTANCE,
+    NAMES,
+    NOMINAL,
+    PAYLOAD,
+    RPY,
+    joint_columns,
+    read_columns,
+)
 from armwright.calibration.readings import Readings, number_labels
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, default_units
@@ -177,7 +186,9 @@ def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: 
 
 def _payloads(table: UnitTable) -> Array:
     """Return (m, 4) mass and centre of mass of what the tool held; 0 where a cell is empty."""
-    columns = [np.nan_to_num(table.numbers([name])[:, 0]) if name in table else np.zeros(len(table)) for name in PAYLOAD]
+    columns = [
+        np.nan_to_num(table.numbers([name])[:, 0]) if name in table else np.zeros(len(table)) for name in PAYLOAD
+    ]
     masses = columns[0]
     for i in np.flatnonzero(masses < 0).tolist():
         raise table.error(i, PAYLOAD[0], f"expected a mass of 0 kg or more, got {masses[i]:g} kg")
@@ -280,7 +291,14 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequ
 
 def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> Iterator[str]:
     """Give a warning of rows that are equal to the last digit, which independent measurements never are."""
-    quantities = [readings.q, readings.payload, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
+    quantities = [
+        readings.q,
+        readings.payload,
+        readings.points,
+        readings.plane[:, None],
+        readings.distances[:, None],
+        readings.other,
+    ]
 
     def row_bytes(rows: slice) -> list[bytes]:
         return [row.tobytes() for row in np.hstack([part[rows] for part in quantities]) + 0.0]  # -0.0 + 0.0 is 0.0

@@ -183,9 +183,7 @@ class MeasurementModel:
         rows = np.flatnonzero(np.isfinite(readings.other[:, 0]))
         if not len(rows):
             return
-        other = self.chain.forward(
-            readings.other[rows], x[: len(self.chain.names)], payload=readings.payload[rows]
-        )
+        other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)], payload=readings.payload[rows])
         distance, direction = _length_and_direction(tool.position[rows] - other.position)
         J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
         yield self._residuals(rows, distance - readings.distances[rows], J)
