@@ -244,7 +244,7 @@ def calibrate_nongeometric(
     nested: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> NongeometricCalibration:
-    """Calibrate an arm, and try joint and lateral compliance, two harmonics of transmission errors and a residual model.
+    """Calibrate an arm; try joint and lateral compliance, two harmonics of transmission errors and a residual model.
 
     Args:
         arm: the nominal arm, with n joints.

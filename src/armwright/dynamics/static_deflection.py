@@ -1,9 +1,9 @@
 """Static deflection of an arm whose joints yield about three axes: its own and the two lateral ones.
 
-The axes of a joint are those of its frame on the link before it, frame i-1: z is the axis of the joint, x and y bend the
-bearing and the link before it. A joint yields about x, then y, then z, each by its compliance times the load about that
-axis, which is what weight, payload and wrench of all that is behind the joint make there. A prismatic joint yields along
-z and about x and y. Loads and deflections depend on each other: they are iterated to the equilibrium.
+The axes of a joint are those of its frame on the link before it, frame i-1: z is the axis of the joint, and about x and
+y bend its bearing and the link before it. A joint yields about x, then y, then z, each by its compliance times the load
+about that axis, which is what weight, payload and wrench of all that is behind the joint make there. A prismatic joint
+yields along z and about x and y. Loads and deflections depend on each other: they are iterated to the equilibrium.
 
 Source:
     Judd & Knasinski (1990) for springs at joints.
@@ -20,12 +20,19 @@ from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike, exact_shape, floats
 from armwright.dynamics.arguments import weighed
 from armwright.errors import InvalidValueError, ShapeError
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import jacobian
+from armwright.spatial.rotations import rotation_vector
 
 _MAX_ITERATIONS = 100
 # Iterations end when no deflection changes by more [rad], [m].
 _CONVERGED = 1e-13
 # A joint that yields farther does not spring back, or is no small deflection [rad], [m].
 _MAX_DEFLECTION = 0.5
+# Corrections end when every tool is within this of its goal [m], [rad]; no joint moves farther in one of them.
+_CORRECTED, _MAX_STEP, _MAX_CORRECTIONS = 1e-10, 0.1, 20
+# Singular values below this part of the largest are taken for zero.
+_RCOND = 1e-6
 
 
 class StaticDeflection(NamedTuple):
@@ -91,7 +98,7 @@ def joint_loads(
     configurations = np.atleast_2d(positions(weighed(arm), q))
     m, n = configurations.shape
     yielded = np.zeros((m, n, 3)) if deflections is None else exact_shape(deflections, (m, n, 3), "deflections")
-    return _loads(arm, configurations, yielded, _frames(arm, configurations, yielded), *_on_tool(m, payload, wrench))
+    return _loads(arm, configurations, yielded, _frames(arm, configurations, yielded), _on_tool(m, payload, wrench))
 
 
 def static_deflection(
@@ -126,7 +133,7 @@ def static_deflection(
     yielded = np.zeros((m, n, 3))
     for _ in range(_MAX_ITERATIONS):
         frames = _frames(arm, configurations, yielded)
-        loads = _loads(arm, configurations, yielded, frames, *on_tool)
+        loads = _loads(arm, configurations, yielded, frames, on_tool)
         change = C * loads - yielded
         yielded = yielded + change
         if np.abs(yielded).max() > _MAX_DEFLECTION:
@@ -147,6 +154,60 @@ def static_deflection(
     moved[:, slides, 2] = rigid.axes[:, slides, 2]
     shares = np.einsum("mnak,mna,mk->mn", moved, yielded, direction)
     return StaticDeflection(yielded, loads, frames.tool, displacement, shares)
+
+
+class CompensatedPositions(NamedTuple):
+    """Joint positions that bring the tool of an arm that yields to where that of the rigid arm is.
+
+    Attributes:
+        q: (m, n) positions of the motors [rad] or [m].
+        residual: (m,) distance of the tool from its goal that remains; rounding where that can be reached [m].
+    """
+
+    q: Array
+    residual: Array
+
+
+def compensated_positions(
+    arm: Arm,
+    compliance: ArrayLike,
+    q: ArrayLike,
+    *,
+    payload: ArrayLike | None = None,
+    wrench: ArrayLike | None = None,
+) -> CompensatedPositions:
+    """Return joint positions at which the tool is at rest where the rigid arm has it in given ones.
+
+    Arms of six joints or more reach its position and orientation, others its position, as near as they can.
+
+    Args:
+        arm: with n joints.
+        compliance: see ``static_deflection``.
+        q: (m, n) joint positions of the rigid arm [rad] or [m].
+        payload: see ``joint_loads``.
+        wrench: see ``joint_loads``.
+
+    Raises:
+        ShapeError: see ``static_deflection``.
+        InvalidValueError: see ``static_deflection``.
+    """
+    there = np.atleast_2d(positions(weighed(arm), q))
+    goals, rows = forward(arm, there), 6 if arm.n >= 6 else 3
+    best, least = there, np.full(len(there), np.inf)
+    for _ in range(_MAX_CORRECTIONS):
+        tool = static_deflection(arm, compliance, there, payload=payload, wrench=wrench).tool
+        error = np.hstack(
+            [goals[:, :3, 3] - tool[:, :3, 3], rotation_vector(goals[:, :3, :3] @ tool[:, :3, :3].swapaxes(1, 2))]
+        )[:, :rows]
+        size = np.linalg.norm(error, axis=1)
+        nearer = size < least
+        best, least = np.where(nearer[:, None], there, best), np.fmin(size, least)
+        if np.all(least < _CORRECTED):
+            break
+        inverse = np.linalg.pinv(jacobian(arm, there)[:, :rows], rcond=_RCOND)
+        there = there + np.clip(np.einsum("mnr,mr->mn", inverse, error), -_MAX_STEP, _MAX_STEP)
+    reached = static_deflection(arm, compliance, best, payload=payload, wrench=wrench).tool
+    return CompensatedPositions(best, np.linalg.norm(goals[:, :3, 3] - reached[:, :3, 3], axis=1))
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
@@ -203,9 +264,10 @@ def _rotations(axis: int, angles: Array | float) -> Array:
     return R
 
 
-def _loads(arm: Arm, q: Array, yielded: Array, frames: _Frames, payload: Array, wrench: Array) -> Array:
+def _loads(arm: Arm, q: Array, yielded: Array, frames: _Frames, on_tool: tuple[Array, Array]) -> Array:
     """Return the loads (m, n, 3) in a deflected configuration."""
     R, p = frames.tool[:, :3, :3], frames.tool[:, :3, 3]
+    payload, wrench = on_tool
     weight = payload[:, :1] * arm.gravity
     force = weight + wrench[:, :3]
     # Moments about the origin of the base, from the tool inwards.

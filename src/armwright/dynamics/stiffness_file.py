@@ -13,11 +13,10 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError
 from armwright.files.document import Document
 
 # Bounds of a stiffness [N m/rad], [N/m]: a joint below yields anywhere, one above is rigid.
-_LEAST, _LARGEST = 1e-3, 1e15
+LEAST_STIFFNESS, LARGEST_STIFFNESS = 1e-3, 1e15
 
 
 def read_stiffness(path: Path | str, arm: Arm) -> Array:
@@ -31,8 +30,7 @@ def read_stiffness(path: Path | str, arm: Arm) -> Array:
         (n, 3) compliance about x, y and z of the frame of each joint, 0 where it is rigid [rad/(N m)], [m/N].
 
     Raises:
-        FileFormatError: the file is missing or malformed, or names what the arm has not.
-        InvalidValueError: it has no stiffness.
+        FileFormatError: the file is missing or malformed, names what the arm has not, or has no stiffness.
     """
     root = Document.read(Path(path)).root
     joints = root.table("joint")
@@ -41,12 +39,13 @@ def read_stiffness(path: Path | str, arm: Arm) -> Array:
         own = joints.table(str(i + 1))
         for axis, key in enumerate(_keys(arm, i)):
             if key in own:
-                compliance[i, axis] = 1 / own.number(key, 0.0, lower=_LEAST, upper=_LARGEST)
+                compliance[i, axis] = 1 / own.number(key, 0.0, lower=LEAST_STIFFNESS, upper=LARGEST_STIFFNESS)
+        own.allow(*_keys(arm, i))
         own.refuse_unknown_keys()
     joints.refuse_unknown_keys()
     root.refuse_unknown_keys()
     if not compliance.any():
-        raise InvalidValueError(f"{path}: expected a stiffness, such as z_Nm_per_rad = 2e4 in [joint.2]")
+        raise root.error(None, "expected a stiffness, such as z_Nm_per_rad = 2e4 in [joint.2]")
     return compliance
 
 
