@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike
+from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.dynamics.static_deflection import (
     CompensatedPositions,
     StaticDeflection,
@@ -145,8 +145,8 @@ def assess_deflection(
         InvalidValueError: see ``static_deflection``.
         TooFewError: there is no configuration.
     """
-    configurations = np.atleast_2d(np.asarray(q, dtype=np.float64))
-    if not configurations.size:
+    configurations = np.atleast_2d(joint_array(q, arm.n))
+    if not len(configurations):
         raise TooFewError("expected a configuration at least")
     return DeflectionAssessment(
         arm=arm,

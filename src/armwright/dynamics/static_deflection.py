@@ -26,8 +26,8 @@ from armwright.spatial.rotations import rotation_vector
 
 _MAX_ITERATIONS = 100
 # Iterations end when no deflection changes by more [rad], [m].
-_CONVERGED = 1e-13
-# A joint that yields farther does not spring back, or is no small deflection [rad], [m].
+_CONVERGED = 1e-12
+# A joint that yields farther is none that springs back, or its compliance is in another unit [rad], [m].
 _MAX_DEFLECTION = 0.5
 # Corrections end when every tool is within this of its goal [m], [rad]; no joint moves farther in one of them.
 _CORRECTED, _MAX_STEP, _MAX_CORRECTIONS = 1e-10, 0.1, 20
@@ -121,8 +121,8 @@ def static_deflection(
 
     Raises:
         ShapeError: an array does not fit.
-        InvalidValueError: a number is not finite, a compliance or a mass is negative, or a joint yields by more than
-            0.5 rad or m: such an arm buckles, or its compliance is in another unit.
+        InvalidValueError: a number is not finite, a compliance or a mass is negative, a joint yields by more than
+            0.5 rad or m, or the arm does not come to rest.
     """
     configurations = np.atleast_2d(positions(weighed(arm), q))
     m, n = configurations.shape
@@ -136,14 +136,16 @@ def static_deflection(
         loads = _loads(arm, configurations, yielded, frames, on_tool)
         change = C * loads - yielded
         yielded = yielded + change
-        if np.abs(yielded).max() > _MAX_DEFLECTION:
+        if not np.abs(yielded).max(initial=0.0) <= _MAX_DEFLECTION:
             worst = int(np.unravel_index(np.abs(yielded).argmax(), yielded.shape)[1])
             raise InvalidValueError(
                 f"{arm.joint_label(worst)} of {arm.name} yields by more than {_MAX_DEFLECTION} rad or m: is its "
-                "stiffness in N m/rad or N/m?"
+                "stiffness in N m/rad or N/m, and are the loads right?"
             )
-        if np.abs(change).max() < _CONVERGED:
+        if np.abs(change).max(initial=0.0) < _CONVERGED:
             break
+    else:
+        raise InvalidValueError(f"{arm.name} does not come to rest: its joints yield too far for its loads")
     rigid = _frames(arm, configurations, np.zeros((m, n, 3)))
     displacement = frames.tool[:, :3, 3] - rigid.tool[:, :3, 3]
     length = np.linalg.norm(displacement, axis=1, keepdims=True)
