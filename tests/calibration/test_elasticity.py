@@ -21,7 +21,7 @@ from armwright.calibration.joint_errors import (
 from armwright.calibration.nongeometric import calibrate_nongeometric
 from armwright.calibration.readings import Readings, readings
 from armwright.dynamics import static_deflection
-from armwright.errors import FileFormatError
+from armwright.errors import FileFormatError, ShapeError
 from calibration.simulated import LENGTH, configurations, random_arm, random_errors
 from samples import Sample
 
@@ -171,3 +171,13 @@ def test_repeatability_under_equal_payload(rng: np.random.Generator) -> None:
     assert found is not None
     assert found.configurations == 2
     assert found.floor < LENGTH / 10
+
+
+def test_payloads_fit_the_readings(rng: np.random.Generator) -> None:
+    """A payload is one for all readings or one for each."""
+    q, points = rng.uniform(-1, 1, (5, 6)), rng.uniform(-1, 1, (5, 3))
+    np.testing.assert_array_equal(readings(q, points, payload=PAYLOAD).payload, [PAYLOAD] * 5)
+    with pytest.raises(ShapeError, match=r"payload: expected shape \(4,\) or \(5, 4\), got \(3,\)"):
+        readings(q, points, payload=(1, 2, 3))
+    with pytest.raises(ShapeError, match=r"payload: expected shape \(4,\) or \(5, 4\), got \(2, 4\)"):
+        elastic_chain(load_arm("puma560")).forward(q, payload=np.zeros((2, 4)))

@@ -135,14 +135,16 @@ def readings(
         others = exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
     frames = [""] * m if frame is None and points is not None else _label_list(frame, m, "frame")
     labels = number_labels(frame=frames, plane=_label_list(plane, m, "plane"), anchor=_label_list(anchor, m, "anchor"))
-    held = exact_shape(np.broadcast_to((0.0,) * 4 if payload is None else payload, (m, 4)), (m, 4), "payload")
+    held = np.zeros(4) if payload is None else floats(payload, "payload")
+    if held.shape not in {(4,), (m, 4)}:
+        raise ShapeError(f"payload: expected shape (4,) or ({m}, 4), got {held.shape}")
     return Readings(
         q=configurations,
         points=positions,
         rotations=rotations,
         distances=lengths,
         other=others,
-        payload=held,
+        payload=np.broadcast_to(held, (m, 4)),
         **labels,
     )
 
