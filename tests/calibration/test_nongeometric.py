@@ -11,7 +11,7 @@ from armwright.calibration.chain import JointErrorModel, kinematic_chain
 from armwright.calibration.correction import corrected_arm
 from armwright.calibration.cross_validation import random_folds
 from armwright.calibration.fitting import calibrate
-from armwright.calibration.joint_errors import compliances, largest_gravity_efforts, transmission_errors
+from armwright.calibration.joint_errors import compliances, largest_gravity_loads, transmission_errors
 from armwright.calibration.nongeometric import calibrate_nongeometric, compare_held_out
 from armwright.calibration.readings import Readings, readings
 from armwright.dynamics.shares import gravity_efforts
@@ -154,8 +154,8 @@ def test_springs_follow_gravity(puma: Arm, rng: np.random.Generator) -> None:
     by_name = {bend.name: bend for bend in compliances(puma)}
 
     assert "joint1.sag" not in by_name
-    expected = -gravity_efforts(puma, q)[:, 1] / largest_gravity_efforts(puma)[1]
-    np.testing.assert_allclose(by_name["joint2.sag"].law(q), expected, rtol=1e-12)
+    expected = -gravity_efforts(puma, q)[:, 1] / largest_gravity_loads(puma)[1, 2]
+    np.testing.assert_allclose(by_name["joint2.sag"].law(q, np.zeros((20, 4))), expected, rtol=1e-12)
 
 
 def test_needs_points(puma: Arm, rng: np.random.Generator) -> None:

@@ -76,8 +76,10 @@ def test_derivatives(rng: np.random.Generator) -> None:
     """Equations of all kinds of readings have the derivatives that differences have."""
     arm = random_arm(rng, 5, slides=True)
     bends = (
-        JointErrorModel("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
-        JointErrorModel("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
+        JointErrorModel("joint1.sin", 0, lambda q, _: np.sin(q[:, 0])),
+        JointErrorModel("joint3.sag", 2, lambda q, _: np.cos(q[:, 1] + q[:, 2])),
+        JointErrorModel("joint3.sag_y", 2, lambda q, _: np.sin(q[:, 1]), 1),
+        JointErrorModel("joint3.sag_x", 2, lambda q, held: np.cos(q[:, 1]) + held[:, 0], 0),
     )
     chain = kinematic_chain(
         arm, base=random_pose(rng, 1.0), target_rotation=rotation_from_vector([0.1, 0.2, 0.3]), joint_errors=bends

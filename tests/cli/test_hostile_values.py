@@ -56,6 +56,7 @@ CALLS: dict[str, list[str]] = {
     "inverse": ["ur5", "--xyz", "400,100,300", "--json"],
     "jacobian": ["ur5", "-q", Q, "--json"],
     "torque": ["puma560", "-q", Q, "--json"],
+    "deflection": ["puma560", "--stiffness", "2e4", "-q", Q, "--json"],
     "singularity": ["ur5", "-q", Q, "--json"],
     "simulate": ["puma560", "-q", Q, "--duration", "0.01", "--json"],
     "move": ["joint", "puma560-seed", "poses.toml", "--no-film", "--json"],

@@ -24,6 +24,7 @@ from .experiment_design import (
 from .fitting import Calibration as Calibration, calibrate as calibrate, calibrate_points as calibrate_points
 from .hand_eye import HandEyeCalibration as HandEyeCalibration, calibrate_hand_eye as calibrate_hand_eye
 from .identifiability import Identifiability as Identifiability, select_identifiable as select_identifiable
+from .joint_errors import identified_compliance as identified_compliance
 from .measurements import Measurements as Measurements, read_measurements as read_measurements
 from .nongeometric import (
     NongeometricCalibration as NongeometricCalibration,

@@ -20,7 +20,7 @@ from armwright.calibration.contradictions import find_contradictions
 from armwright.calibration.cross_validation import HeldOutErrors, cross_validate
 from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
-from armwright.calibration.joint_errors import largest_gravity_efforts
+from armwright.calibration.joint_errors import identified_compliance, largest_gravity_loads
 from armwright.calibration.measurements import Measurements
 from armwright.calibration.noise import remarkable_readings
 from armwright.calibration.nongeometric import ModelComparison, NongeometricCalibration, calibrate_nongeometric
@@ -180,6 +180,8 @@ class CalibrationAssessment:
             data["nongeometric"] = {
                 "candidates": [comparison._asdict() for comparison in beyond.comparisons],
                 "errors": _error_data(beyond.calibration),
+                "fixed": _unfitted_joint_errors(beyond.calibration),
+                "compliance": identified_compliance(beyond.calibration).tolist(),
             }
         return data
 
@@ -368,17 +370,29 @@ def _nongeometric_tables(beyond: NongeometricCalibration) -> Iterator[ResultTabl
         rows=_joint_error_rows(beyond.calibration),
         numbers=(1, 2),
     )
+    yield ResultTable(
+        title="Error models of joints that are not fitted",
+        heads=("error", "reason"),
+        rows=_unfitted_joint_errors(beyond.calibration).items(),
+    )
 
 
 def _joint_error_rows(calibration: Calibration) -> Iterator[tuple[str, ...]]:
     """Give the coefficients of error models of joints: name, value, standard error, what it is of."""
-    joints, arm = {error.name: error.joint for error in calibration.chain.joint_errors}, calibration.chain.arm
-    largest = largest_gravity_efforts(arm)
+    models, arm = {error.name: error for error in calibration.chain.joint_errors}, calibration.chain.arm
+    largest = largest_gravity_loads(arm)
     for name, value, error in zip(calibration.names, calibration.values, calibration.standard_errors, strict=True):
-        if name in joints:
-            unit, effort = ("mrad", "N m") if arm.joints[joints[name]].revolute else ("mm", "N")
-            of = f"{unit} under {largest[joints[name]]:.3g} {effort}" if name.endswith(".sag") else f"amplitude, {unit}"
+        if name in models:
+            _, joint, _, axis = models[name]
+            unit, load = ("mrad", "N m") if axis < 2 or arm.joints[joint].revolute else ("mm", "N")
+            of = f"{unit} under {largest[joint, axis]:.3g} {load}" if ".sag" in name else f"amplitude, {unit}"
             yield name, f"{value * 1e3:+z.3f}", f"{error * 1e3:.3f}", of
+
+
+def _unfitted_joint_errors(calibration: Calibration) -> dict[str, str]:
+    """Return by name why coefficients of error models of joints are not fitted."""
+    names = {error.name for error in calibration.chain.joint_errors}
+    return {parameter.name: parameter.reason for parameter in calibration.fixed if parameter.name in names}
 
 
 def _repeatability_remark(figures: Repeatability | None) -> str:

@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arrays import Array, ArrayLike, floats, joint_array
 from armwright.errors import ShapeError
 from armwright.spatial.poses import homogeneous
 
@@ -48,17 +48,20 @@ class Element(NamedTuple):
 
 
 class JointErrorModel(NamedTuple):
-    """Deviation of a joint from the position of its encoder: compliance or transmission error.
+    """Deviation of a joint from where its encoder has it: compliance or transmission error.
 
     Attributes:
         name: of the error that is its coefficient.
         joint: number of the joint, from 0.
-        law: deviation (m,) for a coefficient of 1 in configurations (m, n) [1].
+        law: deviation (m,) for a coefficient of 1 in configurations (m, n) with payloads (m, 4) [1].
+        axis: of the frame of the joint, on the link before it: 2 for the axis of the joint itself, along which or about
+            which it moves; 0 or 1 for a rotation about x or y.
     """
 
     name: str
     joint: int
-    law: Callable[[Array], Array]
+    law: Callable[[Array, Array], Array]
+    axis: int = 2
 
 
 class ToolPoses(NamedTuple):
@@ -105,15 +108,16 @@ class Chain:
     def is_length(self) -> Array:
         """(k,) whether each error is a length, not an angle."""
         lengths = [element.kind == "translation" for element in self.elements if element.name]
-        of_joints = [not self.arm.joints[error.joint].revolute for error in self.joint_errors]
+        of_joints = [error.axis == 2 and not self.arm.joints[error.joint].revolute for error in self.joint_errors]
         return np.array([*lengths, *of_joints], dtype=np.bool_)
 
-    def forward(self, q: ArrayLike, errors: ArrayLike | None = None) -> ToolPoses:
+    def forward(self, q: ArrayLike, errors: ArrayLike | None = None, *, payload: ArrayLike | None = None) -> ToolPoses:
         """Return the poses of the tool, and their derivatives.
 
         Args:
             q: (m, n) joint positions [rad] or [m].
             errors: (k,) of the arm [m] or [rad]; zero when left out.
+            payload: (4,) or (m, 4) mass and centre of mass in the frame of the tool [kg], [m]; none when left out.
 
         Raises:
             ShapeError: an array does not fit.
@@ -127,18 +131,27 @@ class Chain:
         R = np.tile(self.base[:3, :3], (m, 1, 1))
         p = np.tile(self.base[:3, 3], (m, 1))
         directions, origins, rotates = np.zeros((count, m, 3)), np.zeros((count, m, 3)), np.zeros(count, dtype=bool)
-        deviations = [error.law(configurations) for error in self.joint_errors]
+        carried = np.zeros(4) if payload is None else floats(payload, "payload")
+        if carried.shape not in {(4,), (m, 4)}:
+            raise ShapeError(f"payload: expected shape (4,) or ({m}, 4), got {carried.shape}")
+        carried = np.ascontiguousarray(np.broadcast_to(carried, (m, 4)))
+        deviations = [error.law(configurations, carried) for error in self.joint_errors]
         first = count - len(self.joint_errors)
-        position_error: dict[int, int] = {}  # by joint the number of the error of its own position
         number = 0
         for element in self.elements:
             value = np.full(m, element.value)
             if element.joint is not None:
                 value += configurations[:, element.joint]
-                for i, (error, deviation) in enumerate(zip(self.joint_errors, deviations, strict=True), first):
-                    if error.joint == element.joint:
-                        value += x[i] * deviation
-                position_error[element.joint] = number
+                # The axis of the joint itself is the last, for the lateral ones tilt it.
+                of_joint = [i for i, error in enumerate(self.joint_errors) if error.joint == element.joint]
+                for i in sorted(of_joint, key=lambda i: self.joint_errors[i].axis):
+                    own, k = self.joint_errors[i].axis, first + i
+                    directions[k], origins[k] = R[:, :, own], p
+                    rotates[k] = own != 2 or element.kind == "rotation"
+                    if own == 2:
+                        value += x[k] * deviations[i]
+                    else:
+                        _rotate_about_own_axis(R, own, x[k] * deviations[i])
             axis = R[:, :, element.axis].copy()
             if element.name:
                 value += x[number]
@@ -150,9 +163,9 @@ class Chain:
                 _rotate_about_own_axis(R, element.axis, value)
         levers = np.where(rotates[:, None, None], np.cross(directions, p - origins), directions)
         rotations = np.where(rotates[:, None, None], directions, 0.0)
-        for i, (error, deviation) in enumerate(zip(self.joint_errors, deviations, strict=True), first):
-            levers[i] = levers[position_error[error.joint]] * deviation[:, None]
-            rotations[i] = rotations[position_error[error.joint]] * deviation[:, None]
+        for i, deviation in enumerate(deviations, first):
+            levers[i] *= deviation[:, None]
+            rotations[i] *= deviation[:, None]
         return ToolPoses(p, R, np.moveaxis(levers, 0, -1), np.moveaxis(rotations, 0, -1))
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from armwright.arm.model import Arm
-from armwright.files.column_names import ANGLE, LENGTH, NUMBER, Column, Schema
+from armwright.files.column_names import ANGLE, LENGTH, MASS, NUMBER, Column, Schema
 from armwright.files.unit_table import Header, read_header
 
 NAMES = ("name", "pose", "step_order")
@@ -17,6 +17,7 @@ DEVIATIONS = ("x_deviation", "y_deviation", "z_deviation")
 RPY = ("roll", "pitch", "yaw")
 QUATERNION = ("qw", "qx", "qy", "qz")
 DISTANCE = "distance"
+PAYLOAD = ("payload", "payload_x", "payload_y", "payload_z")
 _WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
 
 
@@ -52,13 +53,16 @@ def measured_columns(arm: Arm) -> Schema:
     others = [Column(name=name, quantity=NUMBER) for name in QUATERNION]
     words = [Column(name=name) for name in _WORDS]
     distance = Column(name=DISTANCE, quantity=LENGTH)
+    payload = [Column(name=name, quantity=LENGTH if name in PAYLOAD[1:] else MASS) for name in PAYLOAD]
 
     def explain(name: str) -> str:
         """Say what a joint is that the arm has not."""
         joint = re.match(r"joint_\d", name)
         return f"{arm.name} has {arm.n} joints; is this a measurement of another arm?" if joint else ""
 
-    return Schema(columns=(*joints, *points, *angles, *others, distance, *deviations, *words), explain=explain)
+    return Schema(
+        columns=(*joints, *points, *angles, *others, distance, *payload, *deviations, *words), explain=explain
+    )
 
 
 def read_columns(
@@ -109,5 +113,7 @@ def _require_related(header: Header) -> None:
         raise header.error(DISTANCE, "expected a column anchor, or a column to with names of rows, beside it")
     for name in header.columns_present(("anchor", "to")):
         header.require([DISTANCE], f"a row with {name} has a distance")
+    for name in header.columns_present(PAYLOAD[1:]):
+        header.require(PAYLOAD[:1], f"{name} is of the centre of mass of a payload")
     if "to" in header and not labels:
         header.require(["name"], "column to has names of rows")

@@ -37,7 +37,11 @@ class CalibratedInverse(NamedTuple):
 
 
 def inverse_calibrated(
-    calibration: Calibration | NongeometricCalibration, goals: ArrayLike, near: ArrayLike
+    calibration: Calibration | NongeometricCalibration,
+    goals: ArrayLike,
+    near: ArrayLike,
+    *,
+    payload: ArrayLike | None = None,
 ) -> CalibratedInverse:
     """Return the joint positions at which a calibrated arm has its tool at goals, by Newton's method.
 
@@ -47,6 +51,7 @@ def inverse_calibrated(
         calibration: of the arm.
         goals: (m, 3) positions in the frame of the measurements [m], or (m, 4, 4) poses.
         near: (m, n) or (n,) joint positions from which to start, such as those of the nominal arm.
+        payload: (4,) or (m, 4) what the tool holds, under which joints yield: see ``readings``.
 
     Raises:
         ShapeError: goals and joint positions are not as many.
@@ -73,7 +78,7 @@ def inverse_calibrated(
     ]
     best, least = q, np.full(len(q), np.inf)
     for _ in range(_MAX_ITERATIONS + 1):
-        tool = chain.forward(q, fit.arm_errors)
+        tool = chain.forward(q, fit.arm_errors, payload=payload)
         shift = 0.0 if residual_model is None else residual_model.shift(q)
         error, J = positions - tool.position - shift, tool.position_jacobian[:, :, columns]
         if targets.ndim == 3:

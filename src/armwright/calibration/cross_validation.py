@@ -50,7 +50,7 @@ class HeldOutErrors(NamedTuple):
 def held_out_errors(calibration: Calibration, measured: Readings) -> HeldOutErrors:
     """Return the errors of a calibrated arm at readings."""
     errors = calibration.model.pose_errors(measured, calibration.errors)
-    return HeldOutErrors(errors.distance, errors.angle, calibration.predict(measured.q))
+    return HeldOutErrors(errors.distance, errors.angle, calibration.predict(measured.q, payload=measured.payload))
 
 
 def calibrate_without(

@@ -133,15 +133,20 @@ class Calibration:
         half = float(student.ppf((1 + confidence) / 2, self.degrees_of_freedom)) * self.standard_errors
         return np.stack([self.values - half, self.values + half], axis=1)
 
-    def predict(self, q: ArrayLike) -> Array:
-        """Return (m, 3) the positions of the corrected arm's tool, in the frame of the measurements [m]."""
-        return self.chain.forward(q, self.arm_errors).position
+    def predict(self, q: ArrayLike, *, payload: ArrayLike | None = None) -> Array:
+        """Return (m, 3) the positions of the corrected arm's tool, in the frame of the measurements [m].
 
-    def uncertainty(self, q: ArrayLike) -> Array:
+        Args:
+            q: (m, n) joint positions [rad] or [m].
+            payload: (4,) or (m, 4) what the tool holds, see ``readings``.
+        """
+        return self.chain.forward(q, self.arm_errors, payload=payload).position
+
+    def uncertainty(self, q: ArrayLike, *, payload: ArrayLike | None = None) -> Array:
         """Return (m, 3, 3) the covariance of ``predict`` that follows from that of the errors [m²]."""
         own = [(i, j) for i, j in enumerate(self.identifiability.fitted) if j < len(self.chain.names)]
         rows, columns = [i for i, _ in own], [j for _, j in own]
-        J = self.chain.forward(q, self.arm_errors).position_jacobian[:, :, columns]
+        J = self.chain.forward(q, self.arm_errors, payload=payload).position_jacobian[:, :, columns]
         return np.asarray(J @ self.covariance[np.ix_(rows, rows)] @ J.swapaxes(1, 2), dtype=np.float64)
 
     def _repr_html_(self) -> str:

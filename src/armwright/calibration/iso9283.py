@@ -96,7 +96,8 @@ def repeatability(measured: Readings) -> Repeatability | None:
 
 
 def _rows_by_configuration(measured: Readings) -> list[Array]:
-    """Return by configuration the rows with a point in the measuring frame."""
+    """Return by configuration, and payload in it, the rows with a point in the measuring frame."""
     rows = np.flatnonzero(measured.with_point & (measured.frame == 0))
-    configuration = distinct_configurations(measured.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)
+    poses = np.hstack([measured.q, measured.payload])[rows]
+    configuration = distinct_configurations(poses) if len(rows) else np.zeros(0, dtype=np.intp)
     return [rows[configuration == i] for i in range(int(configuration.max(initial=-1)) + 1)]

@@ -8,6 +8,8 @@ One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was mea
 - ``plane``, the word for a plane that the tool touched;
 - ``distance_mm`` from an ``anchor``, or ``to`` the tool in the row of that name.
 
+With ``payload_kg`` what the tool held, and with ``payload_x_mm`` and so on its centre of mass in the frame of the tool.
+
 Cells may be empty where a row has something else. ``set`` marks the rows that are held out to check with, and ``name``
 names the rows. docs/tables.md describes the names of columns.
 """
@@ -25,7 +27,16 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
-from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, RPY, joint_columns, read_columns
+from armwright.calibration.columns import (
+    DEVIATIONS,
+    DISTANCE,
+    NAMES,
+    NOMINAL,
+    PAYLOAD,
+    RPY,
+    joint_columns,
+    read_columns,
+)
 from armwright.calibration.readings import Readings, number_labels
 from armwright.errors import FileFormatError, closest
 from armwright.files.column_names import Heading, default_units
@@ -162,7 +173,26 @@ def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: 
     labels = number_labels(frame=frames, plane=planes, anchor=anchors)
     distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(len(q), np.nan)
     other = _other_configurations(table, q, distances)
-    return Readings(q=q, points=points, rotations=rotations, distances=distances, other=other, **labels)
+    return Readings(
+        q=q,
+        points=points,
+        rotations=rotations,
+        distances=distances,
+        other=other,
+        payload=_payloads(table),
+        **labels,
+    )
+
+
+def _payloads(table: UnitTable) -> Array:
+    """Return (m, 4) mass and centre of mass of what the tool held; 0 where a cell is empty."""
+    columns = [
+        np.nan_to_num(table.numbers([name])[:, 0]) if name in table else np.zeros(len(table)) for name in PAYLOAD
+    ]
+    masses = columns[0]
+    for i in np.flatnonzero(masses < 0).tolist():
+        raise table.error(i, PAYLOAD[0], f"expected a mass of 0 kg or more, got {masses[i]:g} kg")
+    return np.stack(columns, axis=1)
 
 
 def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> Array:
@@ -261,7 +291,14 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequ
 
 def _duplicate_warnings(readings: Readings, lines: Sequence[int]) -> Iterator[str]:
     """Give a warning of rows that are equal to the last digit, which independent measurements never are."""
-    quantities = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
+    quantities = [
+        readings.q,
+        readings.payload,
+        readings.points,
+        readings.plane[:, None],
+        readings.distances[:, None],
+        readings.other,
+    ]
 
     def row_bytes(rows: slice) -> list[bytes]:
         return [row.tobytes() for row in np.hstack([part[rows] for part in quantities]) + 0.0]  # -0.0 + 0.0 is 0.0

@@ -32,14 +32,14 @@ from armwright.calibration.cross_validation import (
     random_folds,
 )
 from armwright.calibration.fitting import Calibration, calibrate
-from armwright.calibration.joint_errors import compliances, transmission_errors
+from armwright.calibration.joint_errors import compliances, lateral_compliances, transmission_errors
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, TooFewError
 from armwright.extras import import_extra
 
-# A gain is significant beyond this number of standard errors, and relevant beyond this part of the error. Four
+# A gain is significant beyond this number of standard errors, and relevant beyond this part of the error. Five
 # candidates share the significance level of two standard errors of a single one (Bonferroni).
-_MIN_STANDARD_ERRORS, _MIN_PART = 2.53, 0.01
+_MIN_STANDARD_ERRORS, _MIN_PART = 2.61, 0.01
 # From so many points the length scales of the Gaussian process are learnt; more cost time with their cube.
 _MAX_POINTS = 300
 # Bounds of length scales in sines and cosines of the joints, of the amplitude, and of the noise, as parts of the
@@ -96,9 +96,14 @@ class NongeometricCalibration:
         """Return the distances and angles between readings and the predictions of the model."""
         return _errors(self.calibration, self.residual_model, measured)
 
-    def predict(self, q: ArrayLike) -> Array:
-        """Return (m, 3) the positions of the arm's tool, in the frame of the measurements [m]."""
-        positions = self.calibration.predict(q)
+    def predict(self, q: ArrayLike, *, payload: ArrayLike | None = None) -> Array:
+        """Return (m, 3) the positions of the arm's tool, in the frame of the measurements [m].
+
+        Args:
+            q: (m, n) joint positions [rad] or [m].
+            payload: (4,) or (m, 4) what the tool holds, see ``readings``.
+        """
+        positions = self.calibration.predict(q, payload=payload)
         if self.residual_model is None:
             return positions
         return np.asarray(positions + self.residual_model.shift(q), dtype=np.float64)
@@ -180,9 +185,10 @@ class _FoldedReadings:
         self.folds = random_folds(measured.q, folds, seed)
         self.points = measured.with_point & (measured.frame == 0)
         self.configuration = distinct_configurations(measured.q)
-        no_gears = f"no joint of {arm.name} is revolute"
+        no_gears, no_masses = f"no joint of {arm.name} is revolute", f"{arm.name} has no masses"
         self.candidates = (
-            _Candidate("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses"),
+            _Candidate("joint compliance under gravity", compliances(arm), no_masses),
+            _Candidate("lateral compliance under gravity", lateral_compliances(arm), no_masses),
             _Candidate("transmission error, first harmonic", transmission_errors(arm, 1), no_gears),
             _Candidate("transmission error, second harmonic", transmission_errors(arm, 2), no_gears),
         )
@@ -204,7 +210,7 @@ class _FoldedReadings:
 
     def _fit_residual_model(self, left_out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
         train = self.measured.take(self.points & ~self.held_out(left_out))
-        residuals = train.points - self.calibration(left_out, joints).predict(train.q)
+        residuals = train.points - self.calibration(left_out, joints).predict(train.q, payload=train.payload)
         return _fit_residuals(self.arm, train.q, residuals, self.seed)
 
     def fold_errors(self, fold: int, without: frozenset[int], model: _Model) -> HeldOutErrors:
@@ -238,7 +244,7 @@ def calibrate_nongeometric(
     nested: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> NongeometricCalibration:
-    """Calibrate an arm, and try joint compliance, two harmonics of transmission errors and a residual model.
+    """Calibrate an arm; try joint and lateral compliance, two harmonics of transmission errors and a residual model.
 
     Args:
         arm: the nominal arm, with n joints.

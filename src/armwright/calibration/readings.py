@@ -19,7 +19,7 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.spatial.rotations import orthonormality_error
 
 # What is measured in each reading, and its labels, whose names are in the plural.
-_MEASURED, _LABELS = ("q", "points", "rotations", "distances", "other"), ("frame", "plane", "anchor")
+_MEASURED, _LABELS = ("q", "points", "rotations", "distances", "other", "payload"), ("frame", "plane", "anchor")
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
 # Rotations that are written with four digits.
@@ -44,6 +44,7 @@ class Readings:
         distances: (m,) from an anchor, or from the tool in another configuration [m].
         anchor: (m,) number of the anchor.
         other: (m, n) the other configuration [rad] or [m].
+        payload: (m, 4) mass and centre of mass, in the frame of the tool, of what the tool held [kg], [m].
         frames: names of the frames.
         planes: names of the planes.
         anchors: names of the anchors.
@@ -57,6 +58,7 @@ class Readings:
     distances: Array = attrs.field(converter=_nan_or_read_only)
     anchor: Numbers = attrs.field(converter=read_only)
     other: Array = attrs.field(converter=_nan_or_read_only)
+    payload: Array = attrs.field(converter=read_only)
     frames: tuple[str, ...] = ()
     planes: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()
@@ -89,6 +91,7 @@ def readings(
     distances: ArrayLike | None = None,
     anchor: ArrayLike | None = None,
     other: ArrayLike | None = None,
+    payload: ArrayLike | None = None,
 ) -> Readings:
     """Return readings of one kind, one for each joint configuration; ``concatenate`` joins those of several kinds.
 
@@ -100,6 +103,8 @@ def readings(
         distances: (m,) of the tool from an anchor, or from the tool in another configuration [m].
         anchor: (m,) names of the anchors.
         other: (m, n) the other configurations [rad] or [m].
+        payload: (4,) or (m, 4) mass and centre of mass, in the frame of the tool, of what the tool held [kg], [m];
+            nothing when left out.
 
     Raises:
         ShapeError: they are not as many.
@@ -130,7 +135,18 @@ def readings(
         others = exact_shape(np.atleast_2d(floats(other, "other")), (m, n), "other")
     frames = [""] * m if frame is None and points is not None else _label_list(frame, m, "frame")
     labels = number_labels(frame=frames, plane=_label_list(plane, m, "plane"), anchor=_label_list(anchor, m, "anchor"))
-    return Readings(q=configurations, points=positions, rotations=rotations, distances=lengths, other=others, **labels)
+    held = np.zeros(4) if payload is None else floats(payload, "payload")
+    if held.shape not in {(4,), (m, 4)}:
+        raise ShapeError(f"payload: expected shape (4,) or ({m}, 4), got {held.shape}")
+    return Readings(
+        q=configurations,
+        points=positions,
+        rotations=rotations,
+        distances=lengths,
+        other=others,
+        payload=np.broadcast_to(held, (m, 4)),
+        **labels,
+    )
 
 
 def number_labels(**labels: Sequence[str | None]) -> dict[str, Any]:

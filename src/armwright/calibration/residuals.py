@@ -108,7 +108,7 @@ class MeasurementModel:
         x = np.zeros(len(self.names)) if errors is None else np.asarray(errors, dtype=np.float64)
         if x.shape != (len(self.names),):
             raise ShapeError(f"errors: expected {len(self.names)} of them, got shape {x.shape}")
-        tool = self.chain.forward(readings.q, x[: len(self.chain.names)])
+        tool = self.chain.forward(readings.q, x[: len(self.chain.names)], payload=readings.payload)
         parts = [
             *self._pose_residuals(readings, tool, x),
             *self._plane_residuals(readings, tool, x),
@@ -183,7 +183,7 @@ class MeasurementModel:
         rows = np.flatnonzero(np.isfinite(readings.other[:, 0]))
         if not len(rows):
             return
-        other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)])
+        other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)], payload=readings.payload[rows])
         distance, direction = _length_and_direction(tool.position[rows] - other.position)
         J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
         yield self._residuals(rows, distance - readings.distances[rows], J)

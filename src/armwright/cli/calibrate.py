@@ -27,7 +27,9 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     seed: Annotated[int, Option(min=0, help="Seed of the division into folds.")] = 0,
     beyond: Annotated[
         bool,
-        Option("--beyond", help="Also try joint compliance, transmission error and a learned model of the residuals."),
+        Option(
+            "--beyond", help="Also try compliance about three axes, transmission error and a model of the residuals."
+        ),
     ] = False,
     noise_um: Annotated[
         float | None,

@@ -28,6 +28,7 @@ COMMANDS = {
     "inverse": "Print all solutions of the inverse kinematics of a pose, and whether each is within the joint limits.",
     "jacobian": "Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.",
     "torque": "Print the efforts of a motion, in total and by cause, as the report's main program did.",
+    "deflection": "Print how far the tool of an arm yields at rest by weight and payload, and which joint yields most.",
     "singularity": "Print the factors of the Jacobian's determinant, those near zero, and the lost directions of the tool.",
     "simulate": "Simulate the free response of an arm with friction, stops and gravity, and print its energy balance.",
     "move": "Plan a motion of an arm through the poses of a file.",

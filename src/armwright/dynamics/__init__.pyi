@@ -32,4 +32,12 @@ from .newton_euler import LinkForces as LinkForces, inverse_dynamics as inverse_
 from .payloads import payload as payload
 from .regressors import dynamic_parameters as dynamic_parameters, regressor as regressor
 from .shares import coriolis_efforts as coriolis_efforts, gravity_efforts as gravity_efforts
+from .static_deflection import (
+    CompensatedPositions as CompensatedPositions,
+    StaticDeflection as StaticDeflection,
+    compensated_positions as compensated_positions,
+    joint_loads as joint_loads,
+    static_deflection as static_deflection,
+)
+from .stiffness_file import read_stiffness as read_stiffness
 from .vibration import VibrationAssessment as VibrationAssessment, assess_vibration as assess_vibration

@@ -46,6 +46,7 @@ ANGLE = Quantity("angle", {"deg": _DEGREE, "rad": 1.0, "mrad": 1e-3})
 TIME = Quantity("time", {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0})
 FORCE = Quantity("force", {"n": 1.0, "kn": 1e3})
 TORQUE = Quantity("torque", {"nm": 1.0, "mnm": 1e-3, "knm": 1e3})
+MASS = Quantity("mass", {"kg": 1.0})
 CURRENT = Quantity("current", {"a": 1.0, "ma": 1e-3})
 VELOCITY = Quantity("velocity", {"mm_per_s": 1e-3, "m_per_s": 1.0, "m_per_min": 1 / 60, "mm_per_min": 1e-3 / 60})
 ANGULAR_VELOCITY = Quantity("angular velocity", {"deg_per_s": _DEGREE, "rad_per_s": 1.0})
@@ -59,6 +60,7 @@ _QUANTITIES = (
     TIME,
     FORCE,
     TORQUE,
+    MASS,
     CURRENT,
     VELOCITY,
     ANGULAR_VELOCITY,

@@ -8,6 +8,8 @@ import numpy as np
 from armwright.arm.write import toml_text
 from armwright.calibration.assessment import CalibrationAssessment
 from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf, robot_files
+from armwright.calibration.joint_errors import identified_compliance
+from armwright.dynamics.stiffness_file import stiffness_text
 from armwright.report.calibration_page import calibration_page, length_residuals
 from armwright.report.figures import Drawing, empty_figure, plain_axes, plain_label, svg_text
 
@@ -30,6 +32,7 @@ _CONTENTS = {
     "dh_hayati.csv": "parameters of arm.urdf with rotations about y",
     "calibration.conf": "differences from the model, as controllers of Universal Robots keep them",
     "kinematics.yaml": "frames of the joints for ROS 2, as kinematics_params_file of ur_description",
+    "stiffness.toml": "stiffness of the joints, for armwright deflection",
     "errors.json": "every error with its interval, the covariance, residuals before and after",
     "residuals.svg": "residuals of each reading",
     "distances.svg": "distances before and after, sorted",
@@ -60,6 +63,10 @@ def calibration_files(assessment: CalibrationAssessment, *, title: str, command:
         "errors.json": json.dumps(assessment.as_data(), indent=2) + "\n",
         **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
     }
+    if assessment.nongeometric:
+        compliance = identified_compliance(assessment.nongeometric.calibration)
+        if (compliance > 0).any():
+            files["stiffness.toml"] = stiffness_text(assessment.arm, compliance)
     beside = {name: _CONTENTS[name] for name in files}
     return {**files, "report.html": calibration_page(assessment, drawn, beside, title=title, command=command)}
 
