@@ -1,5 +1,6 @@
 """``armwright clearance``: linkages with clearance in their joints."""
 
+from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_simulate import simulate
@@ -13,11 +14,12 @@ clearance.command("sweep")(sweep)
 clearance.command("estimate")(estimate)
 clearance.command("correct")(correct)
 clearance.command("wear")(wear)
+clearance.command("compare")(compare)
 
 
 @clearance.callback()
 def group() -> None:
-    """Simulate, estimate, correct and wear linkages with clearance in their revolute joints.
+    """Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """

@@ -40,7 +40,7 @@ COMMANDS = {
     "tolerance": "Print how far tolerances of an arm's dimensions move its tool, with probabilities, and what to tighten or relax.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
-    "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",
+    "clearance": "Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.",
 }
 # Commands whose module has another name.
 _MODULES = {"jacobian": "forward"}

@@ -51,7 +51,7 @@ class WearLaw:
 
     def __attrs_post_init__(self) -> None:
         """Check names and ranges."""
-        positive(self.coefficient, "wear coefficient", "m²/N")
+        positive(self.coefficient, "wear coefficient")
         positive(self.width, "width", "m")
         positive(self.layer, "layer", "m")
         one_of("pressure", self.pressure, PRESSURES)
