@@ -1,9 +1,11 @@
 """``armwright clearance``: linkages with clearance in their joints."""
 
+from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
+from armwright.cli.clearance_wear import wear
 from armwright.cli.commands import App, Group
 
 clearance = App(name="clearance", cls=Group, no_args_is_help=True, rich_markup_mode="markdown")
@@ -11,11 +13,13 @@ clearance.command("simulate")(simulate)
 clearance.command("sweep")(sweep)
 clearance.command("estimate")(estimate)
 clearance.command("correct")(correct)
+clearance.command("wear")(wear)
+clearance.command("compare")(compare)
 
 
 @clearance.callback()
 def group() -> None:
-    """Simulate, estimate and correct linkages with clearance in their revolute joints.
+    """Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """

@@ -1,26 +1,18 @@
 """``armwright clearance simulate``: simulate a linkage with joint clearance along a path."""
 
-import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
-from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
+from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, path_of, settings_of, with_clearances
+from armwright.cli.options import Json, OutputFolder, Quiet
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import listed_in, paths
-from armwright.errors import counted
-
-if TYPE_CHECKING:
-    from armwright.clearance.linkage import Linkage
-    from armwright.clearance.paths import Path as TipPath
 
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
-# Drives of the linkages to which an option applies.
-_DRIVES = {"--speed-rpm": 1, "--path": 2}
 
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -87,7 +79,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.scenario import prepare_scenario
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
-    tip_path = _path(model, path, speed_rpm, revolutions)
+    tip_path = path_of(model, path, speed_rpm, revolutions)
     settings = settings_of(
         friction_velocity,
         threshold_mm_s,
@@ -115,30 +107,3 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
             f"{used['integrator']}, steps of {used['step']:.3g} s, friction {used['friction']:g}"
         )
     print_result(run, as_json=as_json, quiet=quiet, output=output, head={"command": command_line()})
-
-
-def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutions: float) -> "TipPath":
-    """Return the path of the tip, or of the drive of a linkage with a single drive."""
-    from armwright.clearance.paths import constant_speed_path, named_path
-
-    drives = len(model.drives)
-    option = "--path" if path is not None else "--speed-rpm"
-    if (path is None) == (speed_rpm is None):
-        example = "--path y1" if drives > 1 else "--speed-rpm 300"
-        raise usage_error("--path", f"expected either --path or --speed-rpm; {model.name} takes {example}")
-    if drives != _DRIVES[option]:
-        other = next((f"; use {name}" for name, number in _DRIVES.items() if number == drives), "")
-        text = f"expected a linkage with {counted(_DRIVES[option], 'drive')}; {model.name} has {drives}{other}"
-        raise usage_error(option, text)
-    if path is not None:
-        return named_path(path)
-    assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
-    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
-        raise usage_error(
-            "--speed-rpm",
-            f"expected a speed other than 0 and revolutions above 0, got {speed_rpm:g} and {revolutions:g}",
-        )
-    speed = speed_rpm * 2 * math.pi / 60
-    start_angle = model.assembly.get(model.drives[0].body, 0.0)
-    name = f"{revolutions:g} revolution{'' if revolutions == 1 else 's'} at {speed_rpm:g} rev/min"
-    return constant_speed_path(name, start_angle, speed, revolutions * 2 * math.pi / abs(speed))

@@ -1,17 +1,20 @@
 """Options, clearances and simulation settings that the commands for linkages share."""
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from typer import Argument, Option
 
 from armwright.cli.numbers import named_numbers
+from armwright.cli.options import usage_error
 from armwright.cli.shell_completion import listed_in
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, counted
 
 if TYPE_CHECKING:
     from armwright.clearance.contact import FrictionLaw
     from armwright.clearance.equations import SlipSpeed
     from armwright.clearance.linkage import Linkage
+    from armwright.clearance.paths import Path as TipPath
     from armwright.clearance.settings import Settings
 
 LinkageName: TypeAlias = Annotated[
@@ -25,6 +28,9 @@ FrictionVelocity: TypeAlias = Annotated[
     Literal["surface", "centre"],
     Option(help="Sliding velocity: of the surface, or of the journal's centre as in the thesis."),
 ]
+# Drives of the linkages to which an option applies.
+_DRIVES = {"--speed-rpm": 1, "--path": 2}
+
 Threshold: TypeAlias = Annotated[float, Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")]
 
 
@@ -73,3 +79,30 @@ def settings_of(
 
     friction = FrictionModel(law=law, velocity=velocity)
     return Settings(threshold=threshold_mm_s * 1e-3, friction=friction, **others)
+
+
+def path_of(model: "Linkage", path: str | None, speed_rpm: float | None, revolutions: float) -> "TipPath":
+    """Return the path of the tip, or of the drive of a linkage with a single drive."""
+    from armwright.clearance.paths import constant_speed_path, named_path
+
+    drives = len(model.drives)
+    option = "--path" if path is not None else "--speed-rpm"
+    if (path is None) == (speed_rpm is None):
+        example = "--path y1" if drives > 1 else "--speed-rpm 300"
+        raise usage_error("--path", f"expected either --path or --speed-rpm; {model.name} takes {example}")
+    if drives != _DRIVES[option]:
+        other = next((f"; use {name}" for name, number in _DRIVES.items() if number == drives), "")
+        text = f"expected a linkage with {counted(_DRIVES[option], 'drive')}; {model.name} has {drives}{other}"
+        raise usage_error(option, text)
+    if path is not None:
+        return named_path(path)
+    assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
+    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
+        raise usage_error(
+            "--speed-rpm",
+            f"expected a speed other than 0 and revolutions above 0, got {speed_rpm:g} and {revolutions:g}",
+        )
+    speed = speed_rpm * 2 * math.pi / 60
+    start_angle = model.assembly.get(model.drives[0].body, 0.0)
+    name = f"{revolutions:g} revolution{'' if revolutions == 1 else 's'} at {speed_rpm:g} rev/min"
+    return constant_speed_path(name, start_angle, speed, revolutions * 2 * math.pi / abs(speed))

@@ -1,0 +1,180 @@
+"""The life of a linkage whose pins wear: profiles and errors of the tip over strokes, extrapolated with error control.
+
+A stroke takes so little that many are alike: the growth of one is multiplied by A. A is as large as the depth of a step
+may be a part of the clearance. Within a step a pressed bin gives way as it wears, which the foundation takes in as
+additional compliance; without it the pressure would leap from bin to bin. Both errors are of first order in A: the same
+life with steps of half the depth tells how large they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, integer, positive
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.wear.worn_stroke import Stroke, lean, leaning_growth, peak_pressures, tip_errors
+from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
+from armwright.errors import InvalidValueError
+
+# A step takes at most this part of the clearance of a pin.
+MAX_STEP = 0.02
+# Steps of a life at most; a step is made anew until the compliance of its wear is right to about this part.
+_MAX_STEPS, _RIGHT, _TRIES = 2000, 0.03, 12
+# Depths beyond this part of the radius of a journal are no wear but a broken pin.
+_BROKEN = 0.5
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class WearLife:
+    """A life in n steps, with n + 1 states from new on; the pins are p, the goals g.
+
+    Attributes:
+        stroke: of the linkage.
+        law: of the wear.
+        strokes: (n + 1,) done at each state.
+        surfaces: (n + 1) worn.
+        work: (n, p) force times sliding distance of a stroke in each step [N m].
+        volumes: (n + 1, p) taken from both surfaces of each pin: k times the force times sliding distance [m³].
+        accuracy: (n + 1, t, g) AP at each state, goal and test [m].
+        repeatability: (n + 1, t, g) RP likewise [m].
+        path: (n + 1, s) error of the tip along the path [m].
+    """
+
+    stroke: Stroke
+    law: WearLaw
+    strokes: Array
+    surfaces: tuple[WornSurfaces, ...]
+    work: Array
+    volumes: Array
+    accuracy: Array
+    repeatability: Array
+    path: Array
+
+    @property
+    def volume_imbalance(self) -> float:
+        """Largest difference of the volume of the profiles from k times the work, as a part of it."""
+        worst = 0.0
+        for surface, volume in zip(self.surfaces[1:], self.volumes[1:], strict=True):
+            for i, pin in enumerate(self.stroke.linkage.pins):
+                area = self.law.bin_area(pin.journal_radius)
+                taken = area * float(surface.bearing[i].sum() + surface.journal[i].sum())
+                worst = max(worst, abs(taken - volume[i]) / max(float(volume[i]), np.finfo(float).tiny))
+        return worst
+
+    def measures(self) -> dict[str, tuple[Array, Array]]:
+        """Return (n + 1,) the errors of the worst goal or moment [m], and their standard deviations over tests."""
+        worst = {"AP": self.accuracy.max(axis=-1), "RP": self.repeatability.max(axis=-1)}
+        tested = {name: (x.mean(axis=-1), x.std(axis=-1, ddof=1)) for name, x in worst.items()}
+        return {**tested, "path": (self.path.max(axis=-1), np.zeros(len(self.path)))}
+
+    def strokes_to(self, measure: str, limit: float) -> float:
+        """Return the strokes after which a measure passes a limit [m]; 0 for a new linkage beyond it, else infinite."""
+        values = self.measures()[measure][0]
+        over = np.flatnonzero(values > limit)
+        if not len(over):
+            return np.inf
+        k = int(over[0])
+        if k == 0:
+            return 0.0
+        part = (limit - values[k - 1]) / (values[k] - values[k - 1])
+        return float(self.strokes[k - 1] + part * (self.strokes[k] - self.strokes[k - 1]))
+
+
+def wear_life(
+    stroke: Stroke,
+    law: WearLaw,
+    *,
+    steps: int = 20,
+    max_step: float = MAX_STEP,
+    until: float = np.inf,
+    progress: Callable[[int, int], None] | None = None,
+) -> WearLife:
+    """Wear a linkage stroke by stroke, many at a time.
+
+    Args:
+        stroke: of the linkage.
+        law: of the wear.
+        steps: how often the strokes of a step are added, at most.
+        max_step: the largest depth of a step, as a part of the clearance of its pin.
+        until: strokes after which the life ends.
+        progress: called with the number of steps made, and of all.
+
+    Raises:
+        InvalidValueError: a number is out of its range, nothing slides, or the pins break.
+    """
+    if integer(steps, "steps", least=1) > _MAX_STEPS:
+        raise InvalidValueError(f"steps: expected at most {_MAX_STEPS}, got {steps}")
+    linkage = stroke.linkage
+    c = _clearances(linkage)
+    depth = positive(max_step, "max_step") * c
+    radii = np.array([pin.journal_radius for pin in linkage.pins])
+    surfaces = WornSurfaces.new(len(linkage.pins), law.bins)
+    states, strokes, works, volumes = [surfaces], [0.0], [], [np.zeros(len(c))]
+    errors = [tip_errors(stroke, law, surfaces)]
+    new = lean(stroke, law, surfaces)
+    if not np.all(new.history.work > 0):
+        raise InvalidValueError(f"{linkage.name}: nothing slides in its pins on path {stroke.name}")
+    softening = depth / peak_pressures(law, linkage, new)
+    for step in range(steps):
+        count, growth, work, softening = _step(stroke, law, surfaces, depth, softening, remaining=until - strokes[-1])
+        surfaces = surfaces.plus(growth, count)
+        if np.any(surfaces.deepest() > _BROKEN * radii):
+            raise InvalidValueError(f"{linkage.name}: after {strokes[-1] + count:.3g} strokes a pin is worn through")
+        works.append(work)
+        volumes.append(volumes[-1] + count * law.coefficient * works[-1])
+        strokes.append(strokes[-1] + count)
+        states.append(surfaces)
+        errors.append(tip_errors(stroke, law, surfaces))
+        if progress is not None:
+            progress(step + 1, steps)
+        if strokes[-1] >= until:
+            break
+    return WearLife(
+        stroke=stroke,
+        law=law,
+        strokes=np.array(strokes),
+        surfaces=tuple(states),
+        work=np.array(works),
+        volumes=np.array(volumes),
+        accuracy=np.stack([x.accuracy for x in errors]),
+        repeatability=np.stack([x.repeatability for x in errors]),
+        path=np.stack([x.path for x in errors]),
+    )
+
+
+def _clearances(linkage: Linkage) -> Array:
+    """Return (p,) the clearances of pins that can wear [m]."""
+    if not linkage.pins:
+        raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
+    c = linkage.clearance_array(None)
+    if not np.all(c > 0):
+        raise InvalidValueError(f"clearances: wear needs them above 0, got {c.min() * 1e3:g} mm")
+    return c
+
+
+def _step(
+    stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, depth: Array, softening: Array, *, remaining: float
+) -> tuple[float, WornSurfaces, Array, Array]:
+    """Return strokes, growth and work by stroke of a step, and the compliance of its wear.
+
+    Args:
+        stroke: of the linkage.
+        law: of the wear.
+        surfaces: before the step.
+        depth: (p,) that the step may take [m].
+        softening: (p,) a compliance to begin with [m³/N].
+        remaining: strokes at most.
+    """
+    for _ in range(_TRIES):
+        leaning = lean(stroke, law, surfaces, softening=softening)
+        growth = leaning_growth(law, stroke.linkage, leaning)
+        count = min(float((depth / growth.deepest()).min()), remaining)
+        given_way = count * growth.deepest() / peak_pressures(law, stroke.linkage, leaning)
+        if np.all(np.abs(np.log(given_way / softening)) < _RIGHT):
+            break
+        # Pressure falls about with the root of the compliance; this finds the compliance soon.
+        softening = given_way**1.5 / softening**0.5
+    return count, growth, leaning.history.work, softening

@@ -1,0 +1,36 @@
+"""``armwright clearance wear`` from the outside."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cli_calls import armwright, check_mistake
+
+SMALL = ("five-bar", "--path", "y1", "--k", "1e-5", "--steps", "1")
+
+
+def test_wear_of_the_five_bar(tmp_path: Path) -> None:
+    """A life has balanced volumes, growing depths, a page with profiles, and quantiles of the strokes to a limit."""
+    done = armwright("clearance", "wear", *SMALL, "--limit-rp", "0.001", "--json", "-o", str(tmp_path / "worn"))
+
+    data = json.loads(done.stdout)
+    assert data["volume_imbalance"] < 1e-12
+    assert [pin["pin"] for pin in data["pins"]] == ["J2", "J3", "J4"]
+    # The new arm is beyond such a limit.
+    assert data["lives"][0]["strokes"] == {"5 %": 0.0, "50 %": 0.0, "95 %": 0.0}
+    files = {path.name for path in (tmp_path / "worn").iterdir()}
+    assert {"report.html", "wear.json", "life.csv", "profiles.csv", "profiles.svg", "life.svg"} <= files
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("five-bar", "--path", "y1", "--k", "0"), "wear coefficient: expected more than 0"),
+        (("five-bar", "--k", "1e-5"), "expected either --path or --speed-rpm"),
+        ((*SMALL, "--bearing-share", "2"), "bearing share: expected 0 to 1, got 2"),
+    ],
+)
+def test_what_is_wrong(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    """What cannot be worn gives one clear error."""
+    check_mistake("clearance", "wear", *options, said=message, folder=tmp_path)
