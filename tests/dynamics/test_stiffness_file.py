@@ -10,7 +10,7 @@ from armwright.dynamics.stiffness_file import stiffness_text
 
 
 def test_written_and_read(tmp_path: Path, rng: np.random.Generator) -> None:
-    """Compliances of turning and sliding joints are written as stiffness and read back; those below 0 are no springs."""
+    """Compliances of turning and sliding joints are written as stiffness and read back, but those below 0."""
     arm = load_arm("stanford-jpl")
     compliance = rng.uniform(1e-6, 1e-3, (arm.n, 3))
     compliance[1, 0], compliance[3] = -1e-5, 0.0
