@@ -8,8 +8,9 @@ from typing import NamedTuple
 from armwright.files.result_table import ResultTable
 from armwright.report.figures import Drawing, Film
 
-# A table with more columns is not beside another.
-_MANY_COLUMNS = 9
+# A table of more pixels than this has no other one beside it; what a character of a cell, one of a head, and the gap of
+# a column take. Words go on in another line after so many characters.
+_HALF_WIDTH, _IN_CELL, _IN_HEAD, _GAP, _LINE = 545, 6.3, 7.3, 14, 24
 
 
 class Tile(NamedTuple):
@@ -124,11 +125,21 @@ def tables(shown: Iterable[ResultTable], *, symbols: Collection[int] = ()) -> st
     """Return tables side by side, wide ones alone, each below its title; those without rows are left out."""
 
     def block(result: ResultTable) -> str:
-        wide = ' class="wide"' * (len(result.heads) > _MANY_COLUMNS)
+        wide = ' class="wide"' * (_width(result) > _HALF_WIDTH)
         remark = f'<p class="quiet">{html.escape(result.remark)}</p>' * bool(result.remark)
         return f"<div{wide}><h3>{html.escape(result.title)}</h3>{table(result, symbols=symbols)}{remark}</div>"
 
     return f'<div class="tables">{"".join(block(result) for result in shown if result.rows)}</div>'
+
+
+def _width(shown: ResultTable) -> float:
+    """Return how wide a table is, about [px]."""
+    width = 0.0
+    for k, (head, *cells) in enumerate(zip(shown.heads, *shown.rows, strict=True)):
+        longest = max(map(len, cells), default=0)
+        longest = longest if k in shown.numbers else min(longest, _LINE)
+        width += max(_IN_HEAD * len(head), _IN_CELL * longest) + _GAP
+    return width
 
 
 def table_cards(shown: Iterable[ResultTable]) -> list[Card]:
