@@ -37,6 +37,8 @@ offset_Nm = -0.5
 stribeck_Nm = 1.5
 stribeck_speed_deg_per_s = 3
 cube_root_Nm = 0.7
+stiffness_Nm_per_rad = 900
+damping_Nms = 2
 [[joint]]
 kind = "prismatic"
 {BODY}
@@ -68,6 +70,8 @@ def test_keys(tmp_path: Path) -> None:
         stribeck=1.5,
         stribeck_speed=math.radians(3),
         cube_root=0.7,
+        stiffness=900,
+        damping=2,
     )
     assert sliding == Motor(offset=4, stribeck=5, stribeck_speed=0.006, cube_root=7)
     assert arm.joints[0].spring == Spring(stiffness=12, rest=math.radians(30))
@@ -88,6 +92,7 @@ def test_keys(tmp_path: Path) -> None:
         (("stiffness_Nm_per_rad", "stiffness_N_per_m"), "unknown key; known keys: rest_deg, stiffness_Nm_per_rad"),
         (("rest_deg = 30", 'rest_deg = "up"'), "joint 1, spring, rest_deg: expected a number"),
         (("offset_Nm = -0.5", "offset_Nm = inf"), "joint 1, motor, offset_Nm: "),
+        (("= 900", "= 1e-9"), "joint 1, motor, stiffness_Nm_per_rad: expected 0.001 to 1e+12, got 1e-09"),
     ],
 )
 def test_mistakes(change: tuple[str, str], message: str, tmp_path: Path) -> None:
@@ -109,7 +114,7 @@ def test_arm_files_keep_everything(sample: Sample, tmp_path: Path) -> None:
 def test_what_is_lost() -> None:
     """URDF and MJCF name all that they cannot hold; MJCF keeps springs, to the bit."""
     arm = load_arm("stanford-jpl")
-    motor = Motor(offset=-0.5, stribeck=1.5, stribeck_speed=0.05, cube_root=0.7)
+    motor = Motor(offset=-0.5, stribeck=1.5, stribeck_speed=0.05, cube_root=0.7, stiffness=900)
     spring = Spring(stiffness=12, rest=0.3)
     arm = attrs.evolve(
         arm,
@@ -120,6 +125,7 @@ def test_what_is_lost() -> None:
         "joint 1: the offset of the friction, -0.5 N m, is not in the file",
         "joint 1: the Stribeck term of the friction, 1.5 N m, is not in the file",
         "joint 1: the cube-root term of the friction, 0.7 N m, is not in the file",
+        "joint 1: the stiffness of its gear, 900 N m/rad, is not in the file",
     }
     of_springs = {
         "joint 1: its spring of 12 N m/rad is not in the file",

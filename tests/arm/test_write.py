@@ -75,7 +75,7 @@ angle = st.floats(-1e12, 1e12)
         coulomb_forward=positive,
         coulomb_backward=positive,
         gear_ratio=positive,
-        stiffness=bound,
+        stiffness=st.one_of(st.just(math.inf), st.floats(1e-3, 1e12)),
         damping=positive,
     ),
     texts=st.tuples(*[st.text(st.characters(exclude_categories=["Cs"]))] * 3),

@@ -51,8 +51,8 @@ def test_of_a_motion(arm: str, tmp_path: Path) -> None:
         ((TWO_LINKS,), "expected the configurations, either one as -q or a motion as a table"),
         (("ur5", "-q", "0,0,0,0,0,0"), "specify stiffness_Nm_per_rad in [joint.motor] of its file, or --stiffness"),
         ((TWO_LINKS, "-q", "0,0", "--stiffness", "1,2,3"), "expected one number, or 2, one per joint, got 3"),
-        ((TWO_LINKS, "-q", "0,0", "--stiffness", "0"), "expected numbers above 0, got 0"),
-        ((TWO_LINKS, "-q", "0,0", "--damping", "-1"), "expected numbers 0 or more, got -1"),
+        ((TWO_LINKS, "-q", "0,0", "--stiffness", "0"), "expected 0.001 to 1e+12, got 0"),
+        ((TWO_LINKS, "-q", "0,0", "--damping", "-1"), "expected 0 to 1e+12, got -1"),
     ],
 )
 def test_usage(arguments: tuple[str, ...], said: str) -> None:

@@ -94,6 +94,8 @@ def test_refused(rng: np.random.Generator) -> None:
         modes(with_gears(attrs.evolve(RODS, links=[ROD, Link()]), 1e4), (0, 0))
     with pytest.raises(InvalidValueError, match="stiffness must be above 0, got 0"):
         with_gears(RODS, 0.0)
+    with pytest.raises(InvalidValueError, match=r"stiffness must be 0\.001 or more, got 1e-09"):
+        with_gears(RODS, 1e-9)
     with pytest.raises(ShapeError, match="stiffness"):
         with_gears(RODS, [1.0, 2.0, 3.0])
     flexible = with_gears(RODS, [np.inf, 1e4])

@@ -12,7 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
 from armwright.dynamics.flexible_joints import modes, with_gears
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.deviation import distance_from_line
 from armwright.motion.flat_feedforward import flat_motion, ninth
@@ -175,6 +175,16 @@ def test_limits_are_kept(smoothing: str) -> None:
     assert found.added > 0
     assert found.deviation < 1e-4
     assert found.after.residual <= found.before.residual
+
+
+def test_soft_gears() -> None:
+    """Gears that do not carry the arm are refused, and those that vibrate for minutes, where nothing is heavy."""
+    with pytest.raises(IncapableArmError, match="so soft that its weight bends them"):
+        settling(with_gears(TWO_LINKS, 10.0), PLAIN)
+    lying = attrs.evolve(with_gears(TWO_LINKS, 0.01), gravity=np.zeros(3))
+    move = joint_move(lying, forward(lying, np.array((START, GOAL))))
+    with pytest.raises(InvalidValueError, match="zvd would add"):
+        smooth_move(lying, move, "zvd", allowed=tolerance(1e-3))
 
 
 def test_refused_shapers() -> None:

@@ -148,6 +148,8 @@ def test_refused(rng: np.random.Generator) -> None:
         simulate_flexible(TWO_LINKS, START, duration=0.1, motors=standing(START), theta=START)
     with pytest.raises(InvalidValueError, match="shorter or the period longer"):
         simulate_flexible(TWO_LINKS, START, duration=1e9)
+    with pytest.raises(InvalidValueError, match="leave such a gear rigid"):
+        simulate_flexible(with_gears(TWO_LINKS, 1e12), START, duration=1.0)
 
 
 def test_command(tmp_path: Path) -> None:

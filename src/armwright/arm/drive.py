@@ -11,6 +11,8 @@ import attrs
 from armwright.arrays import LARGEST, LARGEST_ANGLE, number
 from armwright.errors import InvalidValueError
 
+# Least and largest stiffness of a gear that is not rigid [N m/rad] or [N/m].
+STIFFNESS = (1e-3, 1e12)
 # What the numbers of a part must be, in words.
 _RANGES: dict[str, Callable[[float], bool]] = {
     "finite": math.isfinite,
@@ -87,7 +89,9 @@ class Motor:
         """Refuse drives that give energy for nothing."""
         magnitudes = ("inertia", "viscous", "coulomb_forward", "coulomb_backward", "stribeck", "cube_root")
         check_numbers(self, "motor", (*magnitudes, "stribeck_speed", "damping"), "0 or more")
-        check_numbers(self, "motor", ("stiffness",), "above 0")
+        check_numbers(self, "motor", ("stiffness",), "above 0", STIFFNESS[1])
+        if self.stiffness < STIFFNESS[0]:
+            raise InvalidValueError(f"motor: stiffness must be {STIFFNESS[0]:g} or more, got {self.stiffness:g}")
         check_numbers(self, "motor", ("offset",), "finite")
         check_numbers(self, "motor", ("gear_ratio",))
         if self.stribeck and not self.stribeck_speed:

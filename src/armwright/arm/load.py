@@ -13,7 +13,7 @@ from armwright.arm.collision_pairs import collision_pairs_in
 from armwright.arm.coupling import Coupling
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.documents import SourceDocument, documents_in
-from armwright.arm.drive import Motor, Spring
+from armwright.arm.drive import STIFFNESS, Motor, Spring
 from armwright.arm.limits import Limits
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, typed_pose, unit_of, vector_in
@@ -363,7 +363,12 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
         stribeck=stribeck,
         stribeck_speed=stribeck_speed,
         cube_root=table.number(f"cube_root_{force}", default=0.0, lower=0.0),
-        stiffness=table.positive("stiffness_Nm_per_rad" if revolute else "stiffness_N_per_m", default=math.inf),
+        stiffness=table.number(
+            "stiffness_Nm_per_rad" if revolute else "stiffness_N_per_m",
+            default=math.inf,
+            lower=STIFFNESS[0],
+            upper=STIFFNESS[1],
+        ),
         damping=table.number("damping_Nms" if revolute else "damping_Ns_per_m", default=0.0, lower=0.0),
     )
     table.refuse_unknown_keys()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from armwright.cli.numbers import numbers
+from armwright.cli.numbers import numbers, within
 from armwright.cli.options import ArmName, Configuration, Json, OutputFolder, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.results import write_results
@@ -22,6 +22,9 @@ Stiffness = Annotated[
 Damping = Annotated[
     str | None, Option(help="Damping of the gears in N m s/rad and N s/m, one for all or one per joint.")
 ]
+
+# Bounds of the components of a force [N].
+_FORCE = (-1e6, 1e6)
 
 
 def vibration(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -61,7 +64,7 @@ def vibration(  # noqa: PLR0917 - Typer reads one parameter per option
         values = rows(model, table, ("q", "qd", "qdd"))
     else:
         values = [joint_values(model, q or "", "-q")]
-    push = [0.0] * 3 if force is None else numbers(force, 3, "--force")
+    push = [0.0] * 3 if force is None else [within(x, _FORCE, "--force") for x in numbers(force, 3, "--force")]
     assessment = assess_vibration(model, *values, force=push)
     if output is not None:
         write_results(output, vibration_files(assessment, command=command_line()))
@@ -82,14 +85,16 @@ def with_gears_of(arm: "Arm", stiffness: str | None, damping: str | None) -> "Ar
 
 def _gears(text: str, n: int, option: str) -> list[float]:
     """Read one number for all gears, or one for each; ``inf`` is a rigid gear."""
+    from armwright.arm.drive import STIFFNESS
+
     words = text.replace(",", " ").split()
-    least = "0 or more" if option == "--damping" else "above 0"
     if len(words) not in (1, n):
         raise usage_error(option, f"expected one number, or {n}, one per joint, got {len(words)}")
+    bounds = STIFFNESS if option == "--stiffness" else (0.0, STIFFNESS[1])
     values = [
-        float("inf") if word == "inf" and option == "--stiffness" else numbers(word, 1, option)[0] for word in words
+        float("inf")
+        if word == "inf" and option == "--stiffness"
+        else within(numbers(word, 1, option)[0], bounds, option)
+        for word in words
     ]
-    for value in values:
-        if value < 0 or (value == 0 and option == "--stiffness"):
-            raise usage_error(option, f"expected numbers {least}, got {value:g}")
     return values * (n if len(values) == 1 else 1)

@@ -55,9 +55,11 @@ def with_gears(arm: Arm, stiffness: ArrayLike, damping: ArrayLike = 0.0) -> Arm:
         InvalidValueError: a stiffness is not above 0, or a damping below 0.
     """
     n = known_arm(arm).n
-    rigid = np.equal(stiffness, np.inf)
-    K = one_or_each(np.where(rigid, LARGEST, stiffness), n, "stiffness", "joint")
-    K[rigid if K.shape == rigid.shape else slice(rigid.all() * n)] = np.inf
+    # What checks the numbers refuses infinite ones.
+    array = np.asarray(stiffness)
+    finite = np.where(np.isinf(array) & (array > 0), LARGEST, array) if array.dtype.kind in "iuf" else stiffness
+    K = one_or_each(finite, n, "stiffness", "joint")
+    K[K == LARGEST] = np.inf
     D = one_or_each(damping, n, "damping", "joint")
     gears = zip(arm.motors, K.tolist(), D.tolist(), strict=True)
     return attrs.evolve(arm, motors=[attrs.evolve(m, stiffness=k, damping=d) for m, k, d in gears])

@@ -33,8 +33,12 @@ _MEAN, _COMPARED = 101, 2001
 _ROUNDS, _MORE = 30, 1e-3
 # After its end an arm is watched for so many periods of its lowest mode, within these times [s].
 _WATCHED, _WATCH = 5.0, (0.2, 10.0)
+# A shaper takes so long at most [s].
+_LONGEST = 60.0
 # An arm is at rest when its tool stays so near to its end [m].
 _AT_REST = 1e-4
+# No gear that carries an arm is deflected farther by its weight [rad], [m].
+_SOFT = 1.0
 # An end of a move is at rest where nothing is faster [rad/s], [m/s].
 _STANDS = 1e-9
 
@@ -150,6 +154,7 @@ def smooth_move(
     ends = planned(np.array((0.0, planned.duration)), 1)
     if np.abs(ends).max() > _STANDS:
         raise InvalidValueError("ends: a move that leaves no vibration starts and ends at rest; expected ends at rest")
+    _at_rest(solver.arm, planned(0.0))
     straight = bool(move.tool_path or move.detours)
     if smoothing == "flat":
         if straight:
@@ -169,6 +174,11 @@ def smooth_move(
         frequencies, damping = frequencies[slowest], damping[slowest]
         pairs = zip(frequencies.tolist(), damping.tolist(), strict=True)
         by = combined([shaper(smoothing, f, z, tolerance=tolerance) for f, z in pairs])
+        if by.duration > _LONGEST:
+            raise InvalidValueError(
+                f"{smoothing} would add {by.duration:.3g} s to the move, for gears that vibrate at "
+                f"{frequencies[0]:.3g} Hz; expected {_LONGEST:g} s at most: check the stiffness of the gears"
+            )
         legs, parts = _shaped_legs(arm, _legs(move), by)
         command = links = join(parts)
         before, lengths = join(legs), [each.duration for each in parts]
@@ -209,7 +219,7 @@ def settling(arm: Arm, motors: Trajectory) -> Settling:
 
     Raises:
         UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
-        IncapableArmError: the simulation fails.
+        IncapableArmError: the gears do not carry the weight, or the simulation fails.
     """
     end = _at_rest(arm, motors(motors.duration))
     watched = float(np.clip(_WATCHED / modes(arm, end).frequencies[0], *_WATCH))
@@ -235,9 +245,13 @@ def _at_rest(arm: Arm, theta: Array) -> Array:
     q = theta
     for _ in range(100):
         q, last = theta + deflection(arm, q), q
-        if np.abs(q - last).max() < 1e-14:
+        if np.abs(q - last).max() < 1e-12:
+            return q
+        if np.abs(q - theta).max() > _SOFT:
             break
-    return q
+    raise IncapableArmError(
+        f"arm '{arm.name}': its gears are so soft that its weight bends them without end; check their stiffness"
+    )
 
 
 def _legs(move: Move) -> list[Trajectory]:

@@ -27,7 +27,7 @@ from armwright.compiled.arm import can_be_compiled, compile_arm
 from armwright.dynamics.accelerations import without_drives
 from armwright.dynamics.drives import friction_law
 from armwright.dynamics.energy import kinetic_energy, potential_energy
-from armwright.dynamics.flexible_joints import flexible_gears
+from armwright.dynamics.flexible_joints import flexible_gears, modes
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, UnsupportedArmError
@@ -39,6 +39,8 @@ from armwright.simulation.result import Status
 
 # More samples than this would exhaust the memory.
 _MAX_SAMPLES = 10**6
+# More periods of the fastest vibration, or times of its decay, would take hours.
+_MOST_PERIODS = 20_000
 # Part of a period that rounding may shift a sample by.
 _CRUMB = 1e-9
 
@@ -170,8 +172,8 @@ def simulate_flexible(
 
     Raises:
         ShapeError: arrays or what the functions return are not n long.
-        InvalidValueError: both motors and controller are given, a time is not above 0, or the result would have too
-            many samples.
+        InvalidValueError: both motors and controller are given, a time is not above 0, the result would have too many
+            samples, or a gear is so stiff that it would take too many steps.
         UnsupportedArmError: no gear is flexible, drives are coupled, the mass of a link is unknown, or motors with dry
             friction or without inertia should be driven by efforts.
     """
@@ -184,6 +186,7 @@ def simulate_flexible(
             f"duration: {duration:g} s, one sample every {period:g} s, would be {duration / period:.3g} samples; "
             f"expected at most {_MAX_SAMPLES:g}: make the duration shorter or the period longer"
         )
+    _check_pace(arm, start, duration, driven=motors is None)
     if motors is not None:
         if controller is not None or theta is not None:
             raise InvalidValueError("motors: their positions are given; expected neither efforts nor a start of theirs")
@@ -199,6 +202,21 @@ def simulate_flexible(
         y = np.concatenate([start, speed, first, speed, np.zeros(2)])
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _run(plant, y, duration, period, integrator)
+
+
+def _check_pace(arm: Arm, q: Array, duration: float, *, driven: bool) -> None:
+    """Refuse gears that are so stiff, or so damped, that the steps of an integrator would be too many."""
+    found = modes(arm, q)
+    pace = float((found.frequencies * np.maximum(1.0, 2 * found.damping)).max())
+    inertia = arm.motor_values("inertia")
+    if driven and (moved := flexible_gears(arm) & (inertia > 0)).any():
+        own = np.sqrt(arm.motor_values("stiffness")[moved] / inertia[moved]) / (2 * np.pi)
+        pace = max(pace, float(own.max()), float((arm.motor_values("damping")[moved] / inertia[moved]).max()))
+    if not pace * duration <= _MOST_PERIODS:
+        raise InvalidValueError(
+            f"arm '{arm.name}': a gear vibrates or creeps at {pace:.3g} Hz, {pace * duration:.3g} times in "
+            f"{duration:g} s; expected at most {_MOST_PERIODS}: leave such a gear rigid, or simulate less time"
+        )
 
 
 def _check_driven(arm: Arm) -> None:
