@@ -331,8 +331,8 @@ def _straight(arm: Arm, move: Move, parts: list[Trajectory], smoothing: Smoothin
     """
     if len(parts) != len(move.poses) - 1:
         raise InvalidValueError(
-            f"a path of the tool past {counted(len(move.poses) - 2, 'pose')} without a stop cannot be shaped; expected two poses, "
-            "or a stop at each (--around)"
+            f"a path of the tool past {counted(len(move.poses) - 2, 'pose')} without a stop cannot be shaped; expected "
+            "two poses, or a stop at each (--around)"
         )
     worst = Tolerance(0.0, 0.0)
     for i, part in enumerate(parts):
