@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, integer
 from armwright.dynamics.flexible_joints import deflection, modes
-from armwright.errors import IncapableArmError, InvalidValueError, one_of
+from armwright.errors import IncapableArmError, InvalidValueError, counted, one_of
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.certificate import slowing
@@ -18,7 +18,7 @@ from armwright.motion.deviation import distance_from_line
 from armwright.motion.flat_feedforward import FlatMotion, flat_motion, ninth
 from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
 from armwright.motion.moves import Move
-from armwright.motion.shaping import Shaper, combined, shaped, shaper
+from armwright.motion.shaping import Shaper, ShaperKind, combined, shaped, shaper
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory, join
@@ -39,6 +39,8 @@ _LONGEST = 60.0
 _AT_REST = 1e-4
 # No gear that carries an arm is deflected farther by its weight [rad], [m].
 _SOFT = 1.0
+# So far apart may motors be where a leg ends and the next begins [rad], [m].
+_GAP = 1e-5
 # An end of a move is at rest where nothing is faster [rad/s], [m/s].
 _STANDS = 1e-9
 
@@ -162,36 +164,21 @@ def smooth_move(
                 "flat feedforward needs four derivatives of the joints, and straight lines of the tool have two; "
                 "expected a joint move, or zv, zvd or ei"
             )
-        flats = _flat_legs(solver.arm, move)
-        command, links = join([each.motors for each in flats], gap=1e-5), join([each.links for each in flats])
-        lengths = [each.links.duration for each in flats]
-        before, frequencies, bounds = planned, np.zeros(0), None
+        command = _flat(solver.arm, move)
     else:
-        found = modes(solver.arm, planned(np.linspace(0, planned.duration, _MEAN)))
-        frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
-        # What is damped more creeps to its place.
-        slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
-        frequencies, damping = frequencies[slowest], damping[slowest]
-        pairs = zip(frequencies.tolist(), damping.tolist(), strict=True)
-        by = combined([shaper(smoothing, f, z, tolerance=tolerance) for f, z in pairs])
-        if by.duration > _LONGEST:
-            raise InvalidValueError(
-                f"{smoothing} would add {by.duration:.3g} s to the move, for gears that vibrate at "
-                f"{frequencies[0]:.3g} Hz; expected {_LONGEST:g} s at most: check the stiffness of the gears"
-            )
-        legs, parts = _shaped_legs(arm, _legs(move), by)
-        command = links = join(parts)
-        before, lengths = join(legs), [each.duration for each in parts]
-        bounds = _straight(solver.arm, move, parts, smoothing, allowed) if straight else None
-    times = np.append(0.0, np.cumsum(lengths))
+        command = _shaped(arm, move, smoothing, count=count, tolerance=tolerance)
+    bounds = _straight(solver.arm, move, command.parts, smoothing, allowed) if straight else None
+    motors = join(command.parts, gap=_GAP)
+    times = np.append(0.0, np.cumsum([part.duration for part in command.parts]))
     passing = np.zeros(len(move.times))
     if len(times) != len(move.times):
         # One leg through all poses: of each the delayed time, and the distance in the space of the joints.
-        times = np.clip(move.times * before.duration / planned.duration + (by.parts @ by.delays), 0, command.duration)
-        times[[0, -1]] = 0.0, command.duration
-        passing = _passing(command, move.configurations)
+        stretch = command.before.duration / planned.duration
+        times = np.clip(move.times * stretch + command.delay, 0, motors.duration)
+        times[[0, -1]] = 0.0, motors.duration
+        passing = _passing(motors, move.configurations)
     final = attrs.evolve(
-        move, trajectory=command, times=times, passing_distances=passing, tool_path=None, certificate=None, detours=()
+        move, trajectory=motors, times=times, passing_distances=passing, tool_path=None, certificate=None, detours=()
     )
     softer = attrs.evolve(
         solver.arm,
@@ -200,13 +187,13 @@ def smooth_move(
     return SmoothMove(
         move=final,
         smoothing=smoothing,
-        frequencies=frequencies,
-        added=command.duration - planned.duration,
-        deviation=_path_deviation(solver.arm, planned, links),
+        frequencies=command.frequencies,
+        added=motors.duration - planned.duration,
+        deviation=_path_deviation(solver.arm, planned, command.links),
         line=None if bounds is None else (bounds, allowed),
-        before=settling(solver.arm, before),
-        after=settling(solver.arm, command),
-        softer=settling(softer, command),
+        before=settling(solver.arm, command.before),
+        after=settling(solver.arm, motors),
+        softer=settling(softer, motors),
     )
 
 
@@ -252,6 +239,48 @@ def _at_rest(arm: Arm, theta: Array) -> Array:
     raise IncapableArmError(
         f"arm '{arm.name}': its gears are so soft that its weight bends them without end; check their stiffness"
     )
+
+
+class _Command(NamedTuple):
+    """What smooths a move.
+
+    Attributes:
+        parts: of the motors, between stops.
+        links: their motion on gears that yield as they should.
+        before: the move as it was, slowed where the limits ask for it.
+        frequencies: (k,) that are shaped [Hz].
+        delay: by which a shaper is late on the mean [s].
+    """
+
+    parts: list[Trajectory]
+    links: Trajectory
+    before: Trajectory
+    frequencies: Array
+    delay: float
+
+
+def _flat(arm: Arm, move: Move) -> _Command:
+    """Return the command of flat feedforward from pose to pose."""
+    legs = _flat_legs(arm, move)
+    return _Command([leg.motors for leg in legs], join([leg.links for leg in legs]), move.trajectory, np.zeros(0), 0.0)
+
+
+def _shaped(arm: AnyArm, move: Move, kind: ShaperKind, *, count: int, tolerance: float) -> _Command:
+    """Return the command of shapers for the slowest modes."""
+    planned = move.trajectory
+    found = modes(solver_of(arm).arm, planned(np.linspace(0, planned.duration, _MEAN)))
+    frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
+    # What is damped more creeps to its place.
+    slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
+    pairs = zip(frequencies[slowest].tolist(), damping[slowest].tolist(), strict=True)
+    by = combined([shaper(kind, f, z, tolerance=tolerance) for f, z in pairs])
+    if by.duration > _LONGEST:
+        raise InvalidValueError(
+            f"{kind} would add {by.duration:.3g} s to the move, for gears that vibrate at {frequencies[0]:.3g} Hz; "
+            f"expected {_LONGEST:g} s at most: check the stiffness of the gears"
+        )
+    legs, parts = _shaped_legs(arm, _legs(move), by)
+    return _Command(parts, join(parts), join(legs), frequencies[slowest], float(by.parts @ by.delays))
 
 
 def _legs(move: Move) -> list[Trajectory]:
@@ -302,8 +331,8 @@ def _straight(arm: Arm, move: Move, parts: list[Trajectory], smoothing: Smoothin
     """
     if len(parts) != len(move.poses) - 1:
         raise InvalidValueError(
-            f"a path of the tool past {len(move.poses) - 2} poses without a stop cannot be shaped; expected two poses, "
-            "or a stop at each (--around)"
+            f"a path of the tool past {counted(len(move.poses) - 2, 'pose')} without a stop cannot be shaped; expected "
+            "two poses, or a stop at each (--around)"
         )
     worst = Tolerance(0.0, 0.0)
     for i, part in enumerate(parts):
