@@ -58,6 +58,9 @@ def test_efforts_of_the_model(motion: Path, tmp_path: Path) -> None:
     refused = armwright("life", "puma560", partly, FILE)
     assert refused.returncode == 4
     assert "tau3" in refused.stderr
+    massless = armwright("life", "gp12", short, FILE)
+    assert massless.returncode != 0
+    assert "expected columns of efforts, since gp12 has no masses" in " ".join(massless.stderr.split())
 
 
 @pytest.mark.parametrize(
