@@ -42,6 +42,48 @@ def test_files(motion: Path, tmp_path: Path) -> None:
     assert "RP ≤ 0.1 mm with 95 % for" in " ".join(done.stdout.split())
 
 
+def test_efforts_of_the_model(motion: Path, tmp_path: Path) -> None:
+    """A table without efforts has the lives of one with those of the model, and a note; partly filled it is refused."""
+    rows = motion.read_text(encoding="utf-8").splitlines()
+    short, partly = tmp_path / "short.csv", tmp_path / "partly.csv"
+    short.write_text("\n".join(",".join(row.split(",")[:13]) for row in rows), encoding="utf-8")
+    partly.write_text("\n".join(",".join(row.split(",")[:15]) for row in rows), encoding="utf-8")
+
+    given = json.loads(armwright("life", "puma560", motion, FILE, "--json").stdout)
+    done = armwright("life", "puma560", short, FILE, columns=200)
+    found = json.loads(armwright("life", "puma560", short, FILE, "--json").stdout)
+
+    assert found["hours"] == pytest.approx(given["hours"], rel=0.02)
+    assert "it has no efforts; those of the model of puma560 are taken" in " ".join(done.stdout.split())
+    refused = armwright("life", "puma560", partly, FILE)
+    assert refused.returncode == 4
+    assert "tau3" in refused.stderr
+    massless = armwright("life", "gp12", short, FILE)
+    assert massless.returncode != 0
+    assert "expected columns of efforts, since gp12 has no masses" in " ".join(massless.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("empty.csv", ""),
+        ("binary.csv", "\0\1\2"),
+        ("letters.csv", "t,q1,q2,q3,q4,q5,q6\n0,a,b,c,d,e,f\n"),
+        ("infinite.csv", "t,q1,q2,q3,q4,q5,q6\n" + "\n".join(f"{k},inf,0,0,0,0,0" for k in range(60))),
+        ("huge.csv", "t,q1,q2,q3,q4,q5,q6\n" + "\n".join(f"{k},{k}e300,0,0,0,0,0" for k in range(60))),
+        ("short.csv", "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n"),
+        ("back.csv", "t,q1,q2,q3,q4,q5,q6\n" + "\n".join(f"{-k},0,0,0,0,0,0" for k in range(60))),
+    ],
+)
+def test_hostile_motions(tmp_path: Path, name: str, text: str) -> None:
+    """A broken table is one message that names it."""
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    done = armwright("life", "puma560", tmp_path / name, FILE)
+    assert done.returncode == 4
+    assert name in done.stderr.replace("\n", "")
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

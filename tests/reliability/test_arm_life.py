@@ -10,7 +10,16 @@ from scipy.stats import norm
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.errors import FileFormatError, InvalidValueError, ShapeError
-from armwright.reliability import LifeFile, PlayGrowth, Rating, RepeatedMotion, assess_life, joint_speed, read_life_file
+from armwright.reliability import (
+    ArmLife,
+    LifeFile,
+    PlayGrowth,
+    Rating,
+    RepeatedMotion,
+    assess_life,
+    joint_speed,
+    read_life_file,
+)
 from samples import Sample
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "puma_life.toml"
@@ -64,6 +73,53 @@ def test_first_passage_of_a_lognormal_rate() -> None:
     assert life.curve is not None
     cycles, bands = life.curve
     assert np.interp(median, cycles, bands[1]) == pytest.approx(1e-4, rel=0.01)
+
+
+def test_sensitivities_in_closed_form() -> None:
+    """One play p + r N that reaches a width w lives (w - p) / r cycles; scaling all growths scales any life."""
+    arm = load_arm("puma560")
+
+    def life(*plays: PlayGrowth) -> ArmLife:
+        stated = LifeFile(ratings={}, plays=dict(enumerate(plays)))
+        return assess_life(arm, motion(arm), stated, limit=1e-4, samples=1, most=2)
+
+    one = life(PlayGrowth(first=2e-5, per_cycle=1e-11))
+    assert one.play is not None
+    assert one.sensitivities is not None
+    grown = 1e-11 * one.play.quantile(0.5)
+    assert one.sensitivities[0] == pytest.approx([1.0, 2e-5 / grown], rel=1e-3)
+    assert (one.sensitivities[1:] == 0).all()
+    several = life(*(PlayGrowth(first=1e-5, per_cycle=rate) for rate in (2e-11, 1e-11, 3e-11))).sensitivities
+    assert several is not None
+    assert several[:, 0].sum() == pytest.approx(1, rel=0.01)
+    assert (several[:3] > 0).all()
+
+
+def test_repeatability_counts_at_rest() -> None:
+    """Of a motion with stops only these count, one pose each; of one that never stops all do."""
+    arm = load_arm("puma560")
+    t = np.linspace(0.0, 4.0, 401)
+    # Two swings, each from rest to rest, and a stay of a second between them.
+    phase = np.pi * (np.clip(t, 0, 1.5) + np.clip(t - 2.5, 0, 1.5)) / 1.5
+    moves = ((t < 1.5) | (t > 2.5)) * np.pi / 1.5
+    way = RepeatedMotion(
+        t=t,
+        q=np.outer(1 - np.cos(phase), np.full(6, 0.2)),
+        qd=np.outer(np.sin(phase) * moves, np.full(6, 0.2)),
+        effort=np.ones((401, 6)),
+    )
+    stated = LifeFile(ratings={}, plays={1: PlayGrowth(first=1e-5, per_cycle=1e-11)})
+
+    life = assess_life(arm, way, stated, limit=1e-4, samples=10, most=5)
+
+    assert life.resting
+    assert len(life.q) == 3
+    assert life.q[:, 0] == pytest.approx([0.0, 0.4, 0.0], abs=1e-4)
+    assert life.visited_numbers.tolist() == [1, 101, 201, 301, 401]
+    moving = assess_life(arm, motion(arm), stated, limit=1e-4, samples=10, most=5)
+    assert not moving.resting
+    assert len(moving.q) == 5
+    assert moving.notes == ("The motion never rests, so the repeatability counts at all of its poses.",)
 
 
 def test_growth_by_work_and_measurements() -> None:

@@ -9,7 +9,7 @@ from armwright.arm.positions import ranges
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.jacobians import jacobian
 from armwright.reliability.play_life import PlayLife, WearRates, play_life, repeatability_factors
-from armwright.reliability.reducer_life import ROLLERS, Rating, joint_speed, life_hours, load_of
+from armwright.reliability.reducer_life import BALLS, ROLLERS, Rating, joint_speed, life_hours, load_of
 from armwright.reliability.wear_update import RatePosterior, updated_rate
 from samples import Sample
 
@@ -48,6 +48,18 @@ def test_law_of_life() -> None:
         1000 * 2 ** (10 / 3)
     )
     assert life_hours(rating, load_of([0, 1], [0, 0], [50, 50])) == np.inf
+
+
+@pytest.mark.parametrize(("exponent", "life_factor", "speed_factor"), [(BALLS, 5.4, 0.082), (ROLLERS, 4.6, 0.106)])
+def test_scales_of_a_catalogue(exponent: float, life_factor: float, speed_factor: float) -> None:
+    """At 60 000 rev/min a bearing whose C/P is the life factor by the speed factor lives 80 000 h.
+
+    The factors are read off the printed scales of NTN's catalogue of rolling bearings, table 3.1, to their digits. The
+    load rating C is for a million revolutions: 500 h at 33.3 rev/min.
+    """
+    rating = Rating(effort=life_factor / speed_factor, speed=joint_speed(100, 3), hours=500, exponent=exponent)
+    load = load_of([0, 1], [joint_speed(60_000, 1)] * 2, [1, 1], exponent=exponent)
+    assert life_hours(rating, load) == pytest.approx(80_000, rel=0.05)
 
 
 def test_repeatability_of_play(rng: np.random.Generator) -> None:

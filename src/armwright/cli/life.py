@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 def life(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    motion: Annotated[
-        Path, Argument(help="Table or recording of the motion with its efforts, such as motion.csv of a run.")
-    ],
+    motion: Annotated[Path, Argument(help="Table or recording of the motion, such as motion.csv of a run.")],
     file: Annotated[Path, Argument(help="TOML file of ratings and plays (docs/reliability.md).")],
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
@@ -38,7 +36,8 @@ def life(  # noqa: PLR0917 - Typer reads one parameter per option
 
     The command computes mean and peak efforts of every joint, compares them with the ratings, and prints the lives that
     nine in ten reach, first to fail in front. With --limit it prints the cycles until growing plays make the
-    repeatability too large. With -o it writes report.html, life.json and figures (SVG).
+    repeatability too large, at the poses where the arm rests. Without columns of efforts those of the model count.
+    With -o it writes report.html, life.json and figures (SVG).
 
     **Example:** `armwright life puma560 out/run/motion.csv examples/puma_life.toml --limit 0.1 --cycles-per-day 5000`
     """
@@ -55,12 +54,14 @@ def life(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--dwell", f"expected 0 s or more, got {dwell:g}")
     model = load_arm(arm)
     warn_of_stray(motion)
-    (log,) = read_logs([motion], model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
+    (log,) = read_logs(
+        [motion], model, columns=columns_of(columns), skip_incomplete=skip_incomplete, model_efforts=True
+    )
     stated = read_life_file(file, model)
     with waiting("lives", quiet=as_json):
         found = assess_life(
             model,
-            RepeatedMotion(t=log.t, q=log.q, qd=_speeds(log), effort=log.effort, dwell=dwell),
+            RepeatedMotion(t=log.t, q=log.q, qd=_speeds(log), effort=log.effort, dwell=dwell, notes=log.notes),
             stated,
             limit=None if limit is None else limit * 1e-3,
             per_day=per_day,

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import ArrayLike
+from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files import column_names as names
 from armwright.files.unit_table import Header, read_headers
@@ -28,6 +30,7 @@ def read_logs(
     gains: ArrayLike | None = None,
     columns: Mapping[str, str] | None = None,
     skip_incomplete: bool = False,
+    model_efforts: bool = False,
     topic: str | None = None,
     joint_names: Sequence[str] = (),
 ) -> list[Log]:
@@ -41,12 +44,14 @@ def read_logs(
         columns: names of columns, with unit, by those in the files: ``{"i_1": "joint_1_current_a"}``; of recordings
             names of joints: ``{"elbow": "joint_3"}``.
         skip_incomplete: leave out rows with empty cells.
+        model_efforts: take the efforts of the arm's model where a CSV file has neither efforts nor currents.
         topic: of the joint states in recordings; the only one with efforts that is no plan when left out.
         joint_names: (n,) names of the joints in recordings, where the arm has none.
 
     Raises:
         FileFormatError: a file is missing or broken, a column is missing or has another unit, or a value is no number.
-        InvalidValueError: a log has currents, and there are no gains; its times go back; several topics may be meant.
+        InvalidValueError: a log has currents, and there are no gains; it has no efforts, and the arm has no masses; its
+            times go back; several topics may be meant.
         UnknownNameError: a recording has no such topic.
         MissingExtraError: what reads a recording is not installed.
     """
@@ -58,12 +63,12 @@ def read_logs(
     return [
         read_recording(Path(path), arm, gains=gains, topic=topic, renamed=columns, joint_names=joint_names)
         if is_recorded
-        else _read(next(headers), arm, gains, skip_incomplete=skip_incomplete)
+        else _read(next(headers), arm, gains, skip_incomplete=skip_incomplete, model_efforts=model_efforts)
         for path, is_recorded in zip(paths, recorded, strict=True)
     ]
 
 
-def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete: bool) -> Log:
+def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete: bool, model_efforts: bool) -> Log:
     joints = range(1, arm.n + 1)
     positions, velocities, efforts, currents = (
         [f"{symbol}{i}" for i in joints] for symbol in ("q", "qd", "tau", "current")
@@ -72,6 +77,8 @@ def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete:
     if has_currents and header.columns_present(efforts):
         raise header.error(currents[0], f"expected efforts or currents, but the file has both: {header.listing}")
     driven = currents if has_currents else efforts
+    if model_efforts and not header.columns_present(driven):
+        driven = []
     header.require(["t", *positions, *driven], f"{arm.name} has {arm.n} joints")
     measured = velocities if header.columns_present(velocities) else []
     header.require(measured, "where some joints have velocities, all have")
@@ -88,10 +95,23 @@ def _read(header: Header, arm: Arm, gains: ArrayLike | None, *, skip_incomplete:
         raise table.error(row, "t", f"expected times that increase, got {t[row]:.6g} s after {t[row - 1]:.6g} s")
     velocity = table.numbers(measured) if measured else None
     try:
-        log = Log.of_readings(table.path.name, t, table.numbers(positions), table.numbers(driven), velocity)
+        q = table.numbers(positions)
+        log = Log.of_readings(table.path.name, t, q, table.numbers(driven) if driven else np.zeros_like(q), velocity)
     except InvalidValueError as error:
         raise FileFormatError(table.path, None, "", str(error)) from error
+    if not driven:
+        return _with_model_efforts(log, arm)
     return with_gains(log, gains) if has_currents and gains is not None else log
+
+
+def _with_model_efforts(log: Log, arm: Arm) -> Log:
+    """Return a log whose efforts are those that the model of the arm needs for its motion."""
+    if arm.massless:
+        raise InvalidValueError(f"{log.name}: expected columns of efforts, since {arm.name} has no masses")
+    qd = np.gradient(log.q, log.t, axis=0) if log.qd is None else log.qd
+    effort = inverse_dynamics(arm, log.q, qd, np.gradient(qd, log.t, axis=0))
+    note = f"{log.name}: it has no efforts; those of the model of {arm.name} are taken"
+    return attrs.evolve(log, effort=effort, notes=(*log.notes, note))
 
 
 def _schema(arm: Arm) -> names.Schema:

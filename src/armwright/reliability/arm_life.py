@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, integer, joint_array, not_negative, positive, read_only
@@ -18,6 +19,7 @@ from armwright.reliability.life_file import LifeFile, PlayGrowth
 from armwright.reliability.play_life import PlayLife, WearRates, play_life
 from armwright.reliability.reducer_life import Load, Rating, life_hours, load_of
 
+Rows: TypeAlias = npt.NDArray[np.intp]
 # Of the lives of components, and of the repeatability, what these parts of arms do not reach.
 QUANTILES = (0.05, 0.1, 0.5, 0.95)
 # Part of the components that the life of their rating is reached by: L10.
@@ -26,6 +28,10 @@ _HOUR = 3600.0
 # Points of the curve of the repeatability over the cycles.
 _CURVE = 60
 _LIMITS = (1e-9, 1.0)
+# An arm rests where every joint is slower than this part of its fastest.
+_RESTS = 0.01
+# Part by which growth and first play are changed to see what that does.
+_STEP = 0.02
 
 
 @attrs.frozen(kw_only=True)
@@ -66,8 +72,11 @@ class ArmLife:
         components: with ratings, those that fail first in front.
         slope: of the Weibull law of these.
         work: (n,) effort times way of each joint in a cycle [J].
-        q: (p, n) poses at which the repeatability counts.
+        q: (p, n) poses at which the repeatability counts: where the arm rests, or all if it never does.
         numbers: (p,) of each among the rows of the motion, from 1.
+        resting: whether the arm rests there.
+        visited: (v, n) poses of the whole motion.
+        visited_numbers: (v,) of each among its rows, from 1.
         plays: of joints, by number from 0.
         rates: growth of all plays per cycle; None where no joint has any.
         limit: of the repeatability [m]; None where none is asked for.
@@ -75,6 +84,7 @@ class ArmLife:
         curve: cycles (c,), and what 5, 50 and 95 % of the arms do not exceed of the repeatability at the worst pose
             (3, c) [m]; None likewise.
         per_day: cycles in a day; None where that is not known.
+        motion_notes: what a reader must know of the motion.
     """
 
     arm: Arm
@@ -83,13 +93,17 @@ class ArmLife:
     slope: float
     work: Array
     q: Array
-    numbers: Array
+    numbers: Rows
+    resting: bool
+    visited: Array
+    visited_numbers: Rows
     plays: dict[int, PlayGrowth]
     rates: WearRates | None = None
     limit: float | None = None
     play: PlayLife | None = None
     curve: tuple[Array, Array] | None = None
     per_day: float | None = None
+    motion_notes: tuple[str, ...] = ()
 
     @cached_property
     def hours(self) -> float:
@@ -111,9 +125,9 @@ class ArmLife:
         return np.asarray(_RATED ** (t**self.slope))
 
     @cached_property
-    def telling(self) -> tuple[Array, Array]:
-        """For each joint the pose, from 0, where its play has the largest part in the variance, and this part, (n,)."""
-        squares = (jacobian(self.arm, self.q)[:, :3] ** 2).sum(axis=1)
+    def telling(self) -> tuple[Rows, Array]:
+        """For each joint the visited pose, from 0, where its play has the largest part in the variance; this part."""
+        squares = (jacobian(self.arm, self.visited)[:, :3] ** 2).sum(axis=1)
         first = np.array([self.plays[i].first if i in self.plays else 0.0 for i in range(self.arm.n)])
         weights = np.where(first > 0, first, first[first > 0].mean() if (first > 0).any() else 1.0)
         shares = squares * weights**2
@@ -121,10 +135,37 @@ class ArmLife:
         best = shares.argmax(axis=0)
         return best, shares[best, np.arange(self.arm.n)]
 
+    @cached_property
+    def sensitivities(self) -> Array | None:
+        """By how many per cent the cycles fall for one per cent more growth, and more first play, (n, 2).
+
+        They are those of the arm with median rates, at the pose that passes the limit first, by differences. None where
+        the repeatability has no such life.
+        """
+        if self.play is None or self.rates is None or self.limit is None:
+            return None
+        pose, limit, median = self.q[self.play.pose], self.limit, self.rates.median
+        first = np.array([self.plays[i].first if i in self.plays else 0.0 for i in range(self.arm.n)])
+
+        def cycles(growth: Array, play: Array) -> float:
+            rates = WearRates(median=growth, spread=np.zeros(self.arm.n))
+            return play_life(self.arm, pose, play, rates, limit, samples=1).quantile(0.5)
+
+        middle = cycles(median, first)
+        if not np.isfinite(middle) or not middle:
+            return None
+        found = np.zeros((self.arm.n, 2))
+        for i in self.plays:
+            step = _STEP * np.eye(self.arm.n)[i]
+            more = cycles(median * (1 + step), first), cycles(median, first * (1 + step))
+            less = cycles(median * (1 - step), first), cycles(median, first * (1 - step))
+            found[i] = (np.array(less) - np.array(more)) / (2 * _STEP * middle)
+        return found
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What a reader must know beside the numbers."""
-        notes = []
+        notes = list(self.motion_notes)
         if self.components:
             notes.append(
                 f"Lives are those that nine in ten components reach. The arm ends with the first of them, by a Weibull "
@@ -143,6 +184,8 @@ class ArmLife:
                 "poses below, some thousand cycles apart, would tell it; a single one of 30 visits scatters by 7 %."
             )
         elif self.rates is not None:
+            if self.limit is not None and not self.resting:
+                notes.append("The motion never rests, so the repeatability counts at all of its poses.")
             still = [str(i + 1) for i in self.plays if not self.rates.median[i]]
             if still:
                 joints = f"joint{'s' * (len(still) > 1)} {', '.join(still)}"
@@ -179,9 +222,14 @@ class ArmLife:
                 "pose": int(self.numbers[play.pose]),
                 "shares": play.shares.tolist(),
                 "new_repeatability_m": float(play.repeatability.max()),
+                "sensitivities": None if self.sensitivities is None else self.sensitivities.tolist(),
             },
             "telling": [
-                {"joint": i + 1, "pose": int(self.numbers[self.telling[0][i]]), "share": float(self.telling[1][i])}
+                {
+                    "joint": i + 1,
+                    "pose": int(self.visited_numbers[self.telling[0][i]]),
+                    "share": float(self.telling[1][i]),
+                }
                 for i in sorted(self.plays)
             ],
             "per_day": self.per_day,
@@ -214,12 +262,18 @@ class ArmLife:
         )
         if self.play is not None and self.limit is not None:
             yield self._play_table(self.play, self.limit)
+            yield from self._joint_table(self.play)
         poses, shares = self.telling
         yield ResultTable(
             title="Where the repeatability tells of a play",
             heads=("joint", "play, µrad or µm", "pose", "part of the variance there, %"),
             rows=[
-                (str(i + 1), f"{self.plays[i].first * 1e6:.4g}", str(self.numbers[poses[i]]), f"{100 * shares[i]:.0f}")
+                (
+                    str(i + 1),
+                    f"{self.plays[i].first * 1e6:.4g}",
+                    str(self.visited_numbers[poses[i]]),
+                    f"{100 * shares[i]:.0f}",
+                )
                 for i in sorted(self.plays)
             ],
             numbers=range(4),
@@ -240,7 +294,7 @@ class ArmLife:
         first = ", ".join(f"joint {i + 1} {play.shares[i]:.0%}" for i in order if play.shares[i] > 0.005)
         surely, new = play.quantile(0.05), play.repeatability.max()
         return ResultTable(
-            title=f"Repeatability RP within {limit * 1e3:g} mm at every pose",
+            title=f"Repeatability RP within {limit * 1e3:g} mm at every pose{' of rest' if self.resting else ''}",
             heads=("of the arms", "cycles", "days" if self.per_day is not None else ""),
             rows=rows,
             numbers=(0, 1, 2),
@@ -248,6 +302,20 @@ class ArmLife:
                 f"RP ≤ {limit * 1e3:g} mm with 95 % for {_count(surely)} cycles; {new * 1e3:.3g} mm when new. The "
                 f"variance at pose {self.numbers[play.pose]}, first to pass the limit: {first}."
             ),
+        )
+
+    def _joint_table(self, play: PlayLife) -> Iterator[ResultTable]:
+        if self.sensitivities is None:
+            return
+        order = [int(i) for i in np.argsort(-self.sensitivities.sum(axis=1), kind="stable") if i in self.plays]
+        yield ResultTable(
+            title="Joints: change of the cycles for 1 % more",
+            heads=("joint", "part of the variance, %", "of growth, %", "of first play, %"),
+            rows=[
+                (str(i + 1), f"{100 * play.shares[i]:.0f}", *(f"{-x + 0.0:.2f}" for x in self.sensitivities[i]))
+                for i in order
+            ],
+            numbers=range(4),
         )
 
 
@@ -261,6 +329,7 @@ class RepeatedMotion:
         qd: (m, n) joint velocities.
         effort: (m, n) efforts at the joints [N m] or [N].
         dwell: pause before the motion is repeated [s].
+        notes: what a reader must know of how it was read.
     """
 
     t: Array = attrs.field(converter=read_only)
@@ -268,6 +337,7 @@ class RepeatedMotion:
     qd: Array = attrs.field(converter=read_only)
     effort: Array = attrs.field(converter=read_only)
     dwell: float = 0.0
+    notes: tuple[str, ...] = ()
 
     def __attrs_post_init__(self) -> None:
         """Refuse rows that do not fit each other, and times that do not increase."""
@@ -287,6 +357,16 @@ class RepeatedMotion:
     def work(self) -> Array:
         """Effort times way of each joint in a cycle (n,) [J]."""
         return np.asarray(np.trapezoid(np.abs(self.effort * self.qd), self.t, axis=0))
+
+    @property
+    def rests(self) -> Rows:
+        """Rows, from 0, where the arm rests, of every stay its slowest."""
+        speeds = np.abs(self.qd)
+        fastest = speeds.max(axis=0)
+        slowness = (speeds / np.where(fastest > 0, fastest, 1.0)).max(axis=1)
+        slow = np.flatnonzero(slowness <= _RESTS)
+        stays = np.split(slow, np.flatnonzero(np.diff(slow) > 1) + 1)
+        return np.array([stay[slowness[stay].argmin()] for stay in stays if len(stay)], dtype=np.intp)
 
 
 def assess_life(
@@ -310,7 +390,7 @@ def assess_life(
         per_day: cycles in a day; None where that is not known.
         samples: how many random arms are drawn.
         seed: of these.
-        most: of more rows of the motion, at so many the repeatability is computed, evenly spread.
+        most: of more poses, at so many the repeatability is computed, evenly spread.
 
     Raises:
         ShapeError: the motion is of another arm.
@@ -324,7 +404,8 @@ def assess_life(
         hours = life_hours(rating, load)
         components.append(ComponentLife(joint=joint, name=name, rating=rating, load=load, hours=hours))
     components.sort(key=lambda one: one.hours)
-    rows = np.linspace(0, len(positions) - 1, min(len(positions), integer(most, "most", least=2))).round().astype(int)
+    every, rests = _spread(np.arange(len(positions)), most), motion.rests
+    rows = _spread(rests, most) if len(rests) else every
     life = ArmLife(
         arm=arm,
         cycle=motion.cycle,
@@ -333,8 +414,12 @@ def assess_life(
         work=motion.work,
         q=positions[rows],
         numbers=rows + 1,
+        resting=len(rests) > 0,
+        visited=positions[every],
+        visited_numbers=every + 1,
         plays=dict(stated.plays),
         per_day=None if per_day is None else positive(per_day, "per_day"),
+        motion_notes=motion.notes,
     )
     rates = _rates(arm, stated, motion.work)
     if limit is None:
@@ -349,6 +434,12 @@ def assess_life(
     play = play_life(arm, life.q, first, rates, limit, samples=samples, seed=seed)
     drawn = rates.sample(samples, np.random.default_rng(seed))
     return attrs.evolve(life, rates=rates, limit=limit, play=play, curve=_curve(life, play, first, drawn))
+
+
+def _spread(rows: Rows, most: int) -> Rows:
+    """Return at most so many of some rows, evenly spread."""
+    count = min(len(rows), integer(most, "most", least=2))
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, count).round().astype(int)])
 
 
 def _rates(arm: Arm, stated: LifeFile, work: Array) -> WearRates | None:
