@@ -3,6 +3,7 @@
 from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
+from armwright.cli.clearance_export import export
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_wear import wear
@@ -15,6 +16,7 @@ clearance.command("estimate")(estimate)
 clearance.command("correct")(correct)
 clearance.command("wear")(wear)
 clearance.command("compare")(compare)
+clearance.command("export")(export)
 
 
 @clearance.callback()

@@ -1,0 +1,1 @@
+"""Linkages with clearance as models of Exudyn, an independent multibody program."""
