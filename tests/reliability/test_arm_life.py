@@ -158,7 +158,7 @@ def test_intervals_of_lives_cover(sample: Sample) -> None:
         measured = tuple((n, max(play, 0.0), 2e-6) for n, play in zip(cycles, plays, strict=True))
         growth = PlayGrowth(first=2e-5, per_cycle=1e-11, spread=spread, measured=measured)
         stated = LifeFile(ratings={}, plays={1: growth})
-        life = assess_life(arm, way, stated, limit=limit, samples=400, most=3)
+        life = assess_life(arm, way, stated, limit=limit, samples=400, most=3, seed=sample.case)
         assert life.play is not None
         if truth is None:
             exact = LifeFile(ratings={}, plays={1: PlayGrowth(first=2e-5, per_cycle=1e-11)})
