@@ -7,17 +7,17 @@ import pytest
 
 from cli_calls import armwright, check_mistake
 
-SMALL = ("five-bar", "--path", "y1", "--k", "1e-5", "--steps", "1")
+SMALL = ("four-bar", "--speed-rpm", "600", "--k", "1e-5", "--steps", "1")
 
 
-def test_wear_of_the_five_bar(tmp_path: Path) -> None:
+def test_wear_of_the_four_bar(tmp_path: Path) -> None:
     """A life has balanced volumes, growing depths, a page with profiles, and quantiles of the strokes to a limit."""
-    done = armwright("clearance", "wear", *SMALL, "--limit-rp", "0.001", "--json", "-o", str(tmp_path / "worn"))
+    done = armwright("clearance", "wear", *SMALL, "--limit-ap", "0.001", "--json", "-o", str(tmp_path / "worn"))
 
     data = json.loads(done.stdout)
     assert data["volume_imbalance"] < 1e-12
-    assert [pin["pin"] for pin in data["pins"]] == ["J2", "J3", "J4"]
-    # The new arm is beyond such a limit.
+    assert [pin["pin"] for pin in data["pins"]] == ["B"]
+    # The new linkage is beyond such a limit.
     assert data["lives"][0]["strokes"] == {"5 %": 0.0, "50 %": 0.0, "95 %": 0.0}
     files = {path.name for path in (tmp_path / "worn").iterdir()}
     assert {"report.html", "wear.json", "life.csv", "profiles.csv", "profiles.svg", "life.svg"} <= files

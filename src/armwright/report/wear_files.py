@@ -16,6 +16,8 @@ from armwright.report.static_page import static_page
 
 # The deepest wear is drawn as this part of the radius of its circle.
 _DEPTH_SHARE = 0.35
+# Points along a band of a curve, and wear coefficients across it.
+_BAND = 60
 
 
 def wear_files(assessment: WearAssessment, *, command: str) -> dict[str, Any]:
@@ -108,11 +110,14 @@ def _profiles(assessment: WearAssessment) -> Drawing:
 def _curves(assessment: WearAssessment) -> Drawing:
     figure, life = empty_figure((7.4, 4.4)), assessment.life
     axes = plain_axes(figure, "strokes", "error of the tip, mm")
-    bands = [np.exp(z * assessment.spread) for z in QUANTILES.values()]
+    # The same error comes earlier or later, as the wear coefficient is; beyond the life nothing is known of it.
+    slow, *_, fast = (np.exp(-z * assessment.spread) for z in QUANTILES.values())
+    factors = np.geomspace(fast, slow, _BAND)
+    known = np.linspace(0.0, float(life.strokes[-1]) / slow, _BAND)
     for k, (name, (values, _)) in enumerate(life.measures().items()):
         axes.plot(life.strokes, values * 1e3, f"C{k}-", label=name)
-        # The same error comes earlier or later, as the wear coefficient is.
-        axes.fill_betweenx(values * 1e3, bands[0] * life.strokes, bands[-1] * life.strokes, color=f"C{k}", alpha=0.15)
+        band = np.array([np.interp(factor * known, life.strokes, values) for factor in factors]) * 1e3
+        axes.fill_between(known, band.min(axis=0), band.max(axis=0), color=f"C{k}", alpha=0.15)
         if name in assessment.limits:
             axes.axhline(assessment.limits[name] * 1e3, color=f"C{k}", linestyle=":", linewidth=1)
     axes.set_xlim(0, float(life.strokes[-1]))
