@@ -16,7 +16,7 @@ from armwright.kinematics import forward
 from armwright.motion.frame_queue import NEAR
 from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.physics.world import PhysicsCell
-from armwright.program import Source, compile as translate, known_cell, run
+from armwright.program import Limits, Source, compile as translate, known_cell, run
 from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.debugger.variables import scopes
 from armwright.program.formatter.format import formatted
@@ -440,3 +440,10 @@ grasp = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0, 0, 0]
     assert error.diagnostic.code == "E406"
     assert "BEAM would hit POST" in error.diagnostic.message
     assert ran(f"QUEUE ARM_1 DO BEGIN {way} END ;", posted).failure is None
+
+
+def test_a_queue_that_never_ends(ur5: Cell) -> None:
+    """A queue that takes years is cut at the time limit of the run, and no more of it is computed."""
+    error = failure(f"{START} QUEUE ARM_1 WITH VELOCITY = 1e-9 DO feed(3) ; END.", ur5, Limits(time=0.5))
+
+    assert error.diagnostic.code == "E506"
