@@ -23,6 +23,7 @@ from armwright.report.body_poses import part_poses
 from armwright.report.run_scene import moved_parts
 from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import from_noap
+from program.running import failure, printed
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -148,3 +149,24 @@ def test_worlds_with_physics(tmp_path: Path) -> None:
     cell = cell_with(tmp_path, BELT.format(speed=1, later=1) + BALL.format(x=0, y=0))
     with pytest.raises(InvalidValueError, match="part BALL lies on BELT, which moves by itself"):
         PhysicsCell(cell)
+
+
+def test_a_camera_over_a_belt(tmp_path: Path) -> None:
+    """A part that is read is where it is when the reading ends, so a frame goes with it from then on."""
+    sight = '[visions]\nBALL = { part = "BALL" }\n[camera]\ntime_s = 0.25\n'
+    cell = cell_with(tmp_path, BELT.format(speed=120, later=60) + BALL.format(x=0.1, y=0.03) + sight)
+    read = "READ VISIONS (ball) ; AFFIX ball TO belt ; PAUSE 1 ; PRINT(Y(ball) - Y(belt), X(ball) - X(belt))"
+    recording = run(Source("t.rlo", f"UNITS MM ; VAR ball, belt : FRAME ; BEGIN {read} END."), cell)
+
+    assert printed(recording) == ["100 -30"]
+
+
+def test_advice_about_what_a_belt_carries(tmp_path: Path) -> None:
+    """What is hit is a part, and no arm to wait for; the time is that of the run."""
+    cell = cell_with(tmp_path, BELT.format(speed=200, later=200) + BALL.format(x=0, y=0.05))
+    text = "UNITS MM ; BEGIN PAUSE 0.5 ; MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 40) WITH DURATION = 4 END."
+    error = failure(text, cell)
+
+    assert "would hit BALL" in error.diagnostic.message
+    assert not any("WAIT for an EVENT" in line for line in error.diagnostic.helps)
+    assert any(float(note.split(", at ")[1].removesuffix(" s")) > 0.5 for note in error.diagnostic.notes)

@@ -128,6 +128,7 @@ def test_without_a_sensor(tmp_path: Path) -> None:
     [
         (f"MOVE ARM_1 TO g STRAIGHTLY, WITH SPEED = 10, {SENSED.replace('10', '5')} ;", "E411", "6 mm, outside"),
         (f"MOVE ARM_1 TO g STRAIGHTLY, {SENSED.replace('25', '9000')} ;", "E412", "cannot follow the correction to 6"),
+        (f"MOVE ARM_1 TO g STRAIGHTLY, {SENSED.replace('25', '1e-9')} ;", "E412", "would take 6e+09 s"),
         (f"MOVE ARM_1 TO f * XYZ(0, 0, -50) STRAIGHTLY, {SENSED} ;", "E412", "has no side"),
         (f"MOVE ARM_1 TO f STRAIGHTLY, {SENSED} ;", "E412", "has no side"),
         (

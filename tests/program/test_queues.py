@@ -16,7 +16,7 @@ from armwright.kinematics import forward
 from armwright.motion.frame_queue import NEAR
 from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.physics.world import PhysicsCell
-from armwright.program import Source, compile as translate, known_cell, run
+from armwright.program import Limits, Source, compile as translate, known_cell, run
 from armwright.program.debugger.snapshot import StackFrame
 from armwright.program.debugger.variables import scopes
 from armwright.program.formatter.format import formatted
@@ -420,3 +420,30 @@ def test_the_example() -> None:
     assert lines[12].endswith("s, true")
     assert lines[-1].endswith("2 points refused")
     check_limits(recording)
+
+
+def test_what_is_grasped_on_the_way(tmp_path: Path) -> None:
+    """A part that fingers close on while their arm runs along a queue is looked at on the rest of the way."""
+    held = """
+tool = [1, 0, 0,  0, 1, 0,  0, 0, 1,   0.00, 0.00, 0.12]
+[scene]
+boxes = [{ name = "POST", size_mm = [20, 20, 600], at = [1,0,0, 0,1,0, 0,0,1, 0.49,-0.1,0.3] }]
+[parts.BEAM]
+size_mm = [200, 20, 20]
+mass_kg = 0.5
+at = [1, 0, 0,  0, 1, 0,  0, 0, 1,   0.40, 0.00, 0.25]
+grasp = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0, 0, 0]
+"""
+    posted, way = cell(tmp_path, held), "PUT f * XYZ(0, 0, -40) TO ARM_1 ; PUT f * XYZ(0, 100, -40) TO ARM_1"
+    error = failure(f"{START} QUEUE ARM_1 DO BEGIN {way} ; GRASP ARM_1 END ; END.", posted)
+
+    assert error.diagnostic.code == "E406"
+    assert "BEAM would hit POST" in error.diagnostic.message
+    assert ran(f"QUEUE ARM_1 DO BEGIN {way} END ;", posted).failure is None
+
+
+def test_a_queue_that_never_ends(ur5: Cell) -> None:
+    """A queue that takes years is cut at the time limit of the run, and no more of it is computed."""
+    error = failure(f"{START} QUEUE ARM_1 WITH VELOCITY = 1e-9 DO feed(3) ; END.", ur5, Limits(time=0.5))
+
+    assert error.diagnostic.code == "E506"

@@ -427,9 +427,9 @@ class Simulator:
     def locate(self, frame: str, now: float) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        Of a frame that stands for a part it is the grasp pose of this part, where it is now; a marker of the scene is
-        where it is. The answers of the cell file come one after the other; where it states so, the last one is
-        repeated.
+        Of a frame that stands for a part it is the grasp pose of this part: on a frame that moves by itself where it
+        is when the reading ends, else where it is now. A marker of the scene is where it is. The answers of the cell
+        file come one after the other; where it states so, the last one is repeated.
 
         Raises:
             DeviceError: the cell file has no answer for this frame, or no more.
@@ -438,7 +438,8 @@ class Simulator:
         if sight is not None and sight.kind == "marker":
             return self._cell.markers[sight.name].pose @ sight.relation, self._cell.vision_time
         if sight is not None:
-            X_WP = self._parts.in_world(sight.name, self._carriers(now))
+            moved = self._cell.moving_poses(now + self._cell.vision_time)
+            X_WP = self._parts.in_world(sight.name, self._carriers(now) | moved)
             return X_WP @ self._cell.parts[sight.name].grasp, self._cell.vision_time
         answers = self._answers.get(frame)
         if not answers:

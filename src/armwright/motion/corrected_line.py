@@ -28,6 +28,8 @@ from armwright.motion.trajectory import Trajectory
 _RAMPS = (0.1, 0.2, 0.4, 0.8)
 # Offsets nearer than this are the same [m].
 _SAME = 1e-7
+# What would take longer than this is a slip of units [s].
+_LONGEST = 3600.0
 # Knots are put so far apart to begin with [s], and twice as close, so often, where the tool is farther off than so [m].
 _STEP, _ROUNDS, NEAR = 0.02, 5, 1e-6
 # Where an interval is looked at between its knots.
@@ -110,6 +112,8 @@ class CorrectedLine:
         done, local = now - self.start, now - self.since
         aside = averaged(law, now)
         duration = max(self.line.duration - done, float(law.t[-1]) + WINDOW - now)
+        if duration > _LONGEST:
+            raise CorrectionError(f"that would take {duration:.4g} s, and more than {_LONGEST:g} s are not planned")
 
         def course(t: Array) -> Array:
             X = np.asarray(solver.forward(self.line(np.minimum(done + t, self.line.duration)))).copy()

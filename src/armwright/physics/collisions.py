@@ -335,7 +335,7 @@ class CellCollisions:
             at_start=start <= contacts.margin_at_start(number),
             at_rest=contact.time > move.trajectory.duration,
             other_arm=next(
-                (bodies[i][0].arm for i in contact.bodies if bodies[i][0].arm not in (None, move.arm)), None
+                (arm for i in contact.bodies if (arm := bodies[i][0].arm) in self._cell.arms and arm != move.arm), None
             ),
             guessed=any(bodies[i][1].guessed for i in contact.bodies),
         )

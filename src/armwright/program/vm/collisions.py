@@ -287,6 +287,6 @@ def _error(
         span,
         "cannot be reached on this path",
         secondary=machine.origin_labels(frame, f"`{goal}` got its pose here") if frame else [],
-        notes=collision_location(collision),
+        notes=collision_location(collision, machine.now),
         helps=[*collision_advice(collision, arm), *plan_advice],
     )

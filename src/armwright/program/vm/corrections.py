@@ -90,7 +90,7 @@ def correct(machine: Machine, process: Process, motion: Motion) -> None:
         moved = line.toward(planner_of(machine, motion.arm), asked, now, period)
     except CorrectionError as error:
         text = f"{motion.arm} cannot follow the correction to {asked * 1e3:.4g} mm: {error}"
-        helps = ["use a smaller RATE, or a lower SPEED of the MOVE"]
+        helps = ["use another RATE, or another SPEED of the MOVE"]
         raise machine.error(process, "E412", text, motion.span, "it stops there", helps=helps) from None
     if moved is not line:
         largest = max(correction.largest, abs(asked))

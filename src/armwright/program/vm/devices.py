@@ -6,11 +6,12 @@ import numpy as np
 
 from armwright.cell.hardware import DeviceError
 from armwright.program.bytecode.instructions import Instruction, Op
-from armwright.program.vm.collisions import held_parts, note_released
+from armwright.program.vm.collisions import held_parts, note_released, refuse_collision
 from armwright.program.vm.contact import recompute_efforts, record_contact, update_depth_alarm
 from armwright.program.vm.machine import MAX_PAUSE, Handler, Machine, pose_data
 from armwright.program.vm.process import PendingEffect, Process
 from armwright.program.vm.recording import TimedKind
+from armwright.program.vm.tracking import rest_of_following
 
 
 def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None:
@@ -39,6 +40,9 @@ def _move_fingers(machine: Machine, process: Process, step: Instruction) -> None
     if motion is not None:
         # What is released does not press any more.
         update_depth_alarm(machine, motion)
+    if (queue := machine.state.queues.get(arm)) is not None and (rest := rest_of_following(machine, arm)) is not None:
+        # What it holds now, or no longer, was not looked at when these frames were put in.
+        refuse_collision(machine, process, arm, rest, (queue.labels[-1], step.span))
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
     kind: TimedKind = "GRASP" if closed else "OPEN"
     pending = PendingEffect(kind=kind, text=text, start=machine.next_start(), span=step.span, arm=arm)

@@ -324,6 +324,11 @@ class Machine:
         parts = self.hardware.part_poses()
         return loaded_arm(self.cell, name, [(part, parts.pose(part)) for part in parts.held_by(name)])
 
+    def ticks_run(self, duration: float) -> int:
+        """Return how many servo ticks of a motion that begins now are run: a run comes to its end at its time limit."""
+        period = self.cell.period
+        return min(round(duration / period), math.ceil(max(0.0, self.limits.time - self.now) / period))
+
     def moving_process(self, arm: str) -> Process | None:
         """Return the process that moves an arm; None where the arm is at rest."""
         return next((owner for owner in self.state.processes if owner.motion and owner.motion.arm == arm), None)

@@ -465,11 +465,10 @@ def start_stage(machine: Machine, process: Process, motion: Motion) -> None:
     (stage, goal_names, _, clearance, path, motion.course), period = motion.stages.pop(0), machine.cell.period
     arm, trajectory = machine.cell.arms[motion.arm].arm, stage.trajectory
     ticks = round(trajectory.duration / period)
-    # A run that lasts longer comes to its end before.
-    counted = min(ticks, math.ceil(max(0.0, machine.limits.time - machine.now) / period))
     if motion.stage_index >= 0:
         record_contact(machine, motion)
     push = send_trajectory(machine, motion, trajectory)
+    counted = machine.ticks_run(trajectory.duration)
     tau = trajectory_efforts(machine.loaded_arm(motion.arm), trajectory, period, push, counted)
     update_depth_alarm(machine, motion)
     touch = machine.hardware.contact_time(motion.arm)

@@ -99,10 +99,15 @@ def collision_message(collision: Collision, goal: str, arm: str) -> str:
     return f"`{goal}` cannot be reached by {arm} on this path: {meets} {where}, {deep}"
 
 
-def collision_location(collision: Collision) -> list[str]:
-    """Return where in the world and when an arm would run into something, and what is known of the solids."""
+def collision_location(collision: Collision, begin: float) -> list[str]:
+    """Return where in the world and when an arm would run into something, and what is known of the solids.
+
+    Args:
+        collision: what it would run into.
+        begin: when the motion begins that was looked at [s].
+    """
     own, other = collision.bodies
-    when = "" if collision.at_start else f", {collision.time:.3f} s after this MOVE begins"
+    when = "" if collision.at_start else f", at {begin + collision.time:.3f} s"
     notes = [f"at {_position(collision.point)} mm in the world{when}"]
     if collision.guessed:
         notes.append(f"the shape of {own} or {other} is a guess: the arm file has no exact solid of it")

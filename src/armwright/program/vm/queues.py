@@ -184,7 +184,7 @@ def _run(machine: Machine, process: Process, queue: RingQueue, stage: PlannedSta
         pressed = machine.hardware.peak_contact(arm, now + trajectory.duration)
         send_trajectory(machine, motion, rest_of_following(machine, arm) or hold(trajectory(0.0), period))
         refuse_contact(machine, process, motion, label, pressed)
-    ticks = round(trajectory.duration / period)
+    ticks = machine.ticks_run(trajectory.duration)
     tau = trajectory_efforts(machine.loaded_arm(arm), trajectory, period, push, ticks)
     is_put_at_once = leave_frame(machine, arm)
     peak, when = peak_efforts(machine.cell.arms[arm].arm, tau, period)
