@@ -98,7 +98,13 @@ def write(code: ProgramCode) -> ControllerFile:
     Raises:
         ExportError: it needs what the language has not; the message has the line and the reason.
     """
-    return _Writer(code).file()
+    try:
+        return _Writer(code, eager=False).file()
+    except ExportError as error:
+        if error.diagnostic.code != "E620":
+            raise
+    # Frames that are placed in a FOR may be needed behind it.
+    return _Writer(code, eager=True).file()
 
 
 class _Text(ValueText):
@@ -208,14 +214,14 @@ class _Version:
 
 
 class _Writer:
-    """A program while it is written."""
+    """A program while it is written; an eager one writes out FORs in which frames are placed that it cannot know."""
 
-    def __init__(self, code: ProgramCode) -> None:
+    def __init__(self, code: ProgramCode, *, eager: bool) -> None:
         self._code, self._text = code, _Text(code)
         self._procedures = {one.key: one for one in code.procedures}
         self._body, self._ended = _Body(), False
         # How many FORs around a statement are tried as loops, and the lines of those that are written out.
-        self._attempts, self._written_out = 0, set[str]()
+        self._eager, self._attempts, self._written_out = eager, 0, set[str]()
         self._versions: list[_Version] = []
         # Programs that are called: the key of the procedure, lines, positions.
         self._called: list[tuple[str, list[str], list[str]]] = []
@@ -369,7 +375,9 @@ class _Writer:
         known = self._known.value(one.value)
         if self._code.kinds[one.target.key] != "pose":
             yield f"  {self._text.text(one.target)}={self._text.text(one.value)}"
-        elif known is None and (self._attempts or any(isinstance(each, FunctionCall) for each in values_of(one.value))):
+        elif known is None and (
+            (self._eager and self._attempts) or any(isinstance(each, FunctionCall) for each in values_of(one.value))
+        ):
             self._text.refuse("this pose is known only while the program runs", code="E620")
         self._known.set(one.target, known)
 
@@ -403,7 +411,9 @@ class _Writer:
             elif isinstance(known, str):
                 shown += known
             else:
-                self._text.refuse("MESSAGE shows texts, and no number that is known only while the program runs")
+                self._text.refuse(
+                    "MESSAGE shows texts, and no number that is known only while the program runs", code="E620"
+                )
         line = ""
         for word in re.findall(r"\S*\s*", shown):
             if line and len(line) + len(word) > TEXT_LIMIT:
