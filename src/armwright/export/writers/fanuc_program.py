@@ -124,7 +124,7 @@ class _Text(ValueText):
 
     def text(self, value: Value) -> str:
         """Return a value, in parentheses where it is worked out."""
-        text = re.sub(r" ([-+<>=]+) ", r"\1", self._text(self._plain(value))[0])
+        text = re.sub(r" ([-+<>=]+) ", r"\1", self._text(self.plain(value))[0])
         return text if re.fullmatch(r"[\d.]+|ON|OFF|[A-Z]+\[[^\]]*\]", text) else f"({text})"
 
     def condition(self, value: Value) -> str:
@@ -141,29 +141,40 @@ class _Text(ValueText):
         advice = helps or ("export the run by `--mode plan`",)
         raise refusal(self.code.source, code, message, self.span, "it stands here", helps=advice)
 
-    def _plain(self, value: Value) -> Value:
+    def plain(self, value: Value) -> Value:
         """Return a value of registers and signals alone, with what only the exporter can work out put in."""
         match value:
             case Operation("negative", (inner,)):
-                return self._plain(Operation("-", (Number(0.0), inner)))
+                return self.plain(Operation("-", (Number(0.0), inner)))
             case Operation("not", (inner,)):
-                return _negated(self._plain(inner))
+                return _negated(self.plain(inner))
             case Operation(name, arguments) if name in _ARITHMETIC:
-                return Operation(name, tuple(map(self._plain, arguments)))
+                return self._short(name, tuple(map(self.plain, arguments)))
             case Operation(name, _):
                 known = self.known.value(value)
                 if known is None:
                     text = f"what {name.upper()} gives is known only while the program runs, and has no counterpart"
                     self.refuse(text, code="E620")
-                return self._plain(known)
+                return self.plain(known)
             case FunctionCall(procedure=key):
                 known = self.known.value(value)
                 if known is None:
                     self.refuse(f"a called program has no value, and that of `{key.lower()}` is known only at run time")
-                return self._plain(known)
+                return self.plain(known)
             case Number(value=number) if "e" in number_text(number):
                 self.refuse(f"the number {number:g} cannot be written without an exponent, which the language has not")
         return value
+
+    def _short(self, name: str, arguments: tuple[Value, ...]) -> Value:
+        """Return an operation; what it makes of constants, where it has no others."""
+        if all(isinstance(one, Number | Truth) for one in arguments):
+            known = self.known.value(Operation(name, arguments))
+            return Operation(name, arguments) if known is None else known
+        if name in ("and", "or"):
+            decides = Truth(name == "or")
+            left = tuple(one for one in arguments if not isinstance(one, Truth))
+            return decides if decides in arguments else left[0] if len(left) == 1 else Operation(name, left)
+        return Operation(name, arguments)
 
     def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
         return "ON" if truth else "OFF"
@@ -222,6 +233,8 @@ class _Writer:
         self._body, self._ended = _Body(), False
         # How many FORs around a statement are tried as loops, and the lines of those that are written out.
         self._eager, self._attempts, self._written_out = eager, 0, set[str]()
+        # Lines of MOVEs that lead to places to which they do not in the run.
+        self._unseen: set[str] = set()
         self._versions: list[_Version] = []
         # Programs that are called: the key of the procedure, lines, positions.
         self._called: list[tuple[str, list[str], list[str]]] = []
@@ -270,17 +283,20 @@ class _Writer:
         while waiting:
             called, own, positions = waiting.pop(0)
             if len(own) > MOST_LINES:
-                text = f"the program takes more than {MOST_LINES:,} lines, which controllers of FANUC do not bear"
-                self._text.refuse(text, code="E617")
+                self._refuse_lines()
             written = [re.sub("\0(\\d+)\0", named, line) for line in own]
             files[f"{called}.ls"] = file_text(called, written, positions)
         return files
+
+    def _refuse_lines(self) -> NoReturn:
+        text = f"the program takes more than {MOST_LINES:,} lines, which controllers of FANUC do not bear"
+        self._text.refuse(text, code="E617")
 
     def _approximations(self) -> Iterator[str]:
         code = self._code
         yield from COMMON
         yield "the axis speeds of the controller at 100 % are taken to be the speed limits of the arm"
-        yield "speeds are whole percents, mm/s and degrees per second, the next smaller ones from 1 on"
+        yield "speeds are whole percents, mm/s or degrees per second from 1 on, the next smaller ones where constant"
         yield f"registers and flags from {_FIRST} on hold the variables, and are overwritten"
         yield from program_approximations(code)
         everything = [*code.everything()]
@@ -290,6 +306,8 @@ class _Writer:
             yield "$WAITTMOUT of the controller is overwritten, in hundredths of a second"
         for line in sorted(self._written_out):
             yield f"line {line}: frames depend on the variable of this FOR: its passes stand one after the other"
+        for line in sorted(self._unseen):
+            yield f"line {line}: the run does not come to all places of this MOVE: their postures are the nearest ones"
         yield "frames are worked out before: positions are joints, and change only where the program is exported again"
 
     # ---- blocks ----------------------------------------------------------------------------------------------------
@@ -344,6 +362,10 @@ class _Writer:
                 yield from (f"  MESSAGE[{line}]" for line in self._message(items))
             case WaitUntil():
                 yield from self._wait(statement)
+            case Choice(condition=condition, then=then, otherwise=otherwise) if isinstance(
+                always := text.plain(condition), Truth
+            ):
+                yield from self._block(then if always.value else otherwise)
             case Choice(condition=condition, then=then, otherwise=otherwise):
                 yield f"  IF {text.condition(condition)} THEN"
                 before = self._known.copy()
@@ -444,26 +466,27 @@ class _Writer:
         while True:
             mark = self._mark()
             again, out = self._label(), self._label()
-            lines = [f"  {again}"]
+            lines, always = [f"  {again}"], False
             if not one.at_end:
-                lines += self._unless(one.condition, out)
+                leaves = self._text.plain(Operation("not", (one.condition,)))
+                always = leaves == Truth(False)
+                lines += self._jump(leaves, out)
             lines += self._block(one.body)
             self._text.span = one.span
-            if one.at_end and not self._ended:
-                lines.append(f"  IF {self._text.condition(one.condition)},JMP {again}")
-            elif not self._ended:
-                lines.append(f"  JMP {again}")
+            if not self._ended:
+                lines += self._jump(self._text.plain(one.condition) if one.at_end else Truth(True), again)
             if self._is_settled(mark):
                 break
         if not one.at_end:
-            self._text.known, self._ended = mark[0], one.condition == Truth(True)
+            self._text.known, self._ended = mark[0], always
             lines.append(f"  {out}")
         return lines
 
-    def _unless(self, condition: Value, out: str) -> list[str]:
-        if condition == Truth(True):
-            return []
-        return [f"  IF {self._text.condition(Operation('not', (condition,)))},JMP {out}"]
+    def _jump(self, condition: Value, label: str) -> list[str]:
+        """Return the jump to a label where a condition holds."""
+        if isinstance(condition, Truth):
+            return [f"  JMP {label}"] if condition.value else []
+        return [f"  IF {self._text.condition(condition)},JMP {label}"]
 
     def _is_settled(self, mark: tuple[KnownValues, int, int]) -> bool:
         """Whether what was known before a block is known behind it; else go back and know less."""
@@ -494,6 +517,8 @@ class _Writer:
                 break
             assigned = Assign(span=one.span, target=one.variable, value=Number(value))
             lines += self._block((assigned, *one.body))
+            if len(lines) > MOST_LINES:
+                self._refuse_lines()
         return lines
 
     def _passes(self, one: Count, known: KnownValues) -> list[float] | None:
@@ -620,6 +645,8 @@ class _Writer:
                 text.refuse(message, "write it for each of them", code="E620")
             if len(there):
                 return np.asarray(there[0])
+            if not one.passages.zones[leg]:
+                self._unseen.add(self._code.source.place(one.span.start))
         arm = self._code.placed.arm
         solution = inverse(arm, np.linalg.inv(self._code.placed.base) @ goal.X, q[0])
         found = nearest_configurations(solution, q[0])
