@@ -298,11 +298,8 @@ class _Writer:
         yield "the axis speeds of the controller at 100 % are taken to be the speed limits of the arm"
         yield "speeds are whole percents, mm/s or degrees per second from 1 on, the next smaller ones where constant"
         yield f"registers and flags from {_FIRST} on hold the variables, and are overwritten"
-        yield from program_approximations(code)
-        everything = [*code.everything()]
-        if any(isinstance(one, MoveTo) and len(one.targets) > 1 for one in everything):
-            yield "corners are not rounded: the arm stops at each, as the language rounds them by no length"
-        if any(isinstance(one, WaitUntil) and one.limit is not None for one in everything):
+        yield from program_approximations(code, rounded=False)
+        if any(isinstance(one, WaitUntil) and one.limit is not None for one in code.everything()):
             yield "$WAITTMOUT of the controller is overwritten, in hundredths of a second"
         for line in sorted(self._written_out):
             yield f"line {line}: frames depend on the variable of this FOR: its passes stand one after the other"
