@@ -21,6 +21,7 @@ CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",
     "krl": EXAMPLES / "kr6_cell.toml",
     "rapid": EXAMPLES / "irb120_cell.toml",
+    "fanuc": EXAMPLES / "lrmate_cell.toml",
 }
 DECLARED = """
 UNITS MM ;

@@ -12,6 +12,7 @@ from armwright.cell.model import Cell
 from armwright.errors import CheckFailedError, InvalidValueError, one_of
 from armwright.export.checkers import (
     fanuc as fanuc_checker,
+    fanuc_machine,
     krl as krl_checker,
     krl_machine,
     rapid as rapid_checker,
@@ -34,6 +35,7 @@ from armwright.export.translation.translate import translate_program
 from armwright.export.writers import (
     drive_csv,
     fanuc,
+    fanuc_program,
     krl,
     krl_program,
     rapid,
@@ -57,6 +59,7 @@ _PROGRAMS: Mapping[Target, tuple[ModuleType, ModuleType]] = {
     "urscript": (urscript_program, urscript_machine),
     "krl": (krl_program, krl_machine),
     "rapid": (rapid_program, rapid_machine),
+    "fanuc": (fanuc_program, fanuc_machine),
 }
 # Languages that do not say in lengths how corners are rounded.
 _WITHOUT_ZONES = ("fanuc",)
@@ -98,7 +101,7 @@ def export_program(
         cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
         name: of the exported program; that of the file without one.
         mode: ``program`` for the program with its control flow, ``plan`` for what it did in the cell; without it
-            ``program`` to ``urscript``, ``krl`` and ``rapid``, and ``plan`` to all others.
+            ``program`` to ``urscript``, ``krl``, ``rapid`` and ``fanuc``, and ``plan`` to all others.
 
     Returns:
         The files, with their proof; every difference from the run is within what is allowed.
@@ -127,7 +130,7 @@ def export_compiled(target: Target, compiled: Compilation, recording: Recording,
     """Return a program, with its control flow, for a controller; see ``export_program``.
 
     Args:
-        target: ``urscript``, ``krl`` or ``rapid``.
+        target: ``urscript``, ``krl``, ``rapid`` or ``fanuc``.
         compiled: the program.
         recording: its run in the cell; the exported program is run there too, and does the same.
         name: of the exported program.

@@ -25,8 +25,8 @@ _PLACE = re.compile(r"P\[(\d+)\]\{\s*GP1:\s*UF : 0, UT : (\d+),\s*(J1=[^}]*?)\s*
 _JOINT = re.compile(r"J(\d)= *(-?\d+\.\d+) deg")
 _SPEED = re.compile(r"(\d+(?:\.\d*)?)(msec|sec|%)")
 # Of units of time: their length, and how far a time is rounded up for its digits [s].
-_UNITS = {"msec": (1e-3, 1e-3), "sec": (1.0, 0.1)}
-_WAIT_ROUNDING = 0.01
+TIMES = {"msec": (1e-3, 1e-3), "sec": (1.0, 0.1)}
+WAIT_ROUNDING = 0.01
 
 
 def read(text: str) -> ReadProgram:
@@ -38,7 +38,7 @@ def read(text: str) -> ReadProgram:
     tree = parse("fanuc", text)
     name = next(str(node) for node in tree.children if getattr(node, "type", "") == "NAME")
     places = [node for node in tree.children if getattr(node, "type", "") == "POSITION"]
-    reader = _Reader(dict(_place(node) for node in places))
+    reader = _Reader(dict(position(node) for node in places))
     for line in tree.find_data("line"):
         if line.children[0] is not None:
             reader.statement(line.children[0], line.meta.line)
@@ -69,7 +69,7 @@ class _Reader:
                 self._assign(str(node.children[0].children[0]), node.children[1], line)
             case "wait" if str(node.children[1]) == "(sec)":
                 seconds = number(node.children[0], line)
-                self.actions.append(WaitAction(line=line, seconds=seconds, rounding=_WAIT_ROUNDING))
+                self.actions.append(WaitAction(line=line, seconds=seconds, rounding=WAIT_ROUNDING))
             case "message":
                 self.actions.append(TextAction(line=line, text=str(node.children[0])[len("MESSAGE[") : -1]))
             case other:
@@ -82,7 +82,7 @@ class _Reader:
         if q is None or tool != self._tool_number or found is None or any(others):
             raise CheckError(f"line {line}: the checker knows motions to joint positions with the tool in a time alone")
         value, unit = float(found[1]), found[2]
-        length, rounding = _UNITS.get(unit, (0.0, 0.0))
+        length, rounding = TIMES.get(unit, (0.0, 0.0))
         duration = value * length if length else None
         passes = end not in ("FINE", "CNT0")
         if kind == "J":
@@ -113,7 +113,7 @@ class _Reader:
             raise CheckError(f"line {line}: the checker does not know what {target} is set to here")
 
 
-def _place(token: Any) -> tuple[str, tuple[str, Array]]:
+def position(token: Any) -> tuple[str, tuple[str, Array]]:
     """Return the name of a position, its tool and its joint positions (6,) as the controller counts them [rad]."""
     found = _PLACE.fullmatch(token)
     joints = _JOINT.findall(found[3]) if found is not None else []

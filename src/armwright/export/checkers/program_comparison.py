@@ -118,7 +118,7 @@ class _ComparingRun(Comparing):
     def _text(self, text: str, actions: Iterator[Action]) -> None:
         """Compare a text, of which numbers may have other digits, in lines that are not too long."""
         shown, line = "", 0
-        while not line or len(shown.split()) < len(text.split()):
+        while not line or _is_short(shown, text):
             action = next(actions, None)
             if not isinstance(action, TextAction):
                 self.statements.add(1, line)
@@ -127,6 +127,13 @@ class _ComparingRun(Comparing):
         one, other = shown.split(), text.split()
         alike = len(one) == len(other) and all(_same_word(a, b) for a, b in zip(one, other, strict=True))
         self.statements.add(0 if alike else 1, line)
+
+
+def _is_short(shown: str, text: str) -> bool:
+    """Whether another line is to follow, as words are missing, or a part of the last one."""
+    words, wanted = shown.split(), text.split()
+    cut = bool(words) and len(words) == len(wanted) and len(shown) < len(text) and not _same_word(words[-1], wanted[-1])
+    return len(words) < len(wanted) or (cut and wanted[-1].startswith(words[-1]))
 
 
 def _same_word(shown: str, word: str) -> bool:

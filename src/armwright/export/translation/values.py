@@ -1,7 +1,8 @@
 """Values of a program: numbers, conditions and poses; what is constant is worked out at once."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
 
 import numpy as np
 
@@ -22,9 +23,11 @@ from armwright.export.translation.frames import is_array
 from armwright.program.bytecode.instructions import Op
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_arm
-from armwright.program.language.units import convert
+from armwright.program.language.units import UnitSystem, convert
 from armwright.program.syntax import pose_literals, tree
 from armwright.program.vm.operators import OPERATIONS, OPERATIONS_WITH_UNITS, EvaluationError
+
+Constant: TypeAlias = Number | Truth | Pose
 
 _ARITHMETIC: Mapping[str, Op] = {"+": Op.ADD, "-": Op.SUB, "*": Op.MUL, "/": Op.DIV}
 _COMPARISONS: Mapping[str, Op] = {"<": Op.LT, "<=": Op.LE, "=": Op.EQ, "<>": Op.NE, ">=": Op.GE, ">": Op.GT}
@@ -63,8 +66,9 @@ def value_of(context: Context, node: tree.Node) -> Value:  # noqa: PLR0911 - one
 
 def operate(context: Context, name: str, *arguments: Value, node: tree.Node) -> Value:
     """Return what an operation makes of values: a constant where all of them are."""
-    if all(isinstance(argument, Number | Truth | Pose) for argument in arguments) and name in _OPERATIONS:
-        return _constant(context, name, arguments, node)
+    constants = [argument for argument in arguments if isinstance(argument, Number | Truth | Pose)]
+    if len(constants) == len(arguments) and name in _OPERATIONS:
+        return _constant(context, name, tuple(constants), node)
     return simplified(name, arguments)
 
 
@@ -86,16 +90,22 @@ def simplified(name: str, arguments: tuple[Value, ...]) -> Value:  # noqa: PLR09
     return Operation(name, arguments)
 
 
-def _constant(context: Context, name: str, arguments: tuple[Value, ...], node: tree.Node) -> Value:
-    op = _OPERATIONS[name]
-    plain = [
-        one.X if isinstance(one, Pose) else one.value for one in arguments if isinstance(one, Number | Truth | Pose)
-    ]
-    units = (context.scope.symbols.units,) if op in OPERATIONS_WITH_UNITS else ()
+def _constant(context: Context, name: str, arguments: tuple[Constant, ...], node: tree.Node) -> Value:
     try:
-        result = OPERATIONS[op](*plain, *units)
+        return worked_out(name, arguments, context.scope.symbols.units)
     except EvaluationError as error:
         context.refuse(node.span, error.message, error.label, code="E619")
+
+
+def worked_out(name: str, arguments: Iterable[Constant], units: UnitSystem) -> Constant:
+    """Return what an operation of the language makes of constants.
+
+    Raises:
+        EvaluationError: it has no value.
+    """
+    op = _OPERATIONS[name]
+    plain = [one.X if isinstance(one, Pose) else one.value for one in arguments]
+    result = OPERATIONS[op](*plain, *((units,) if op in OPERATIONS_WITH_UNITS else ()))
     if isinstance(result, bool | np.bool_):
         return Truth(bool(result))
     return Pose(result) if isinstance(result, np.ndarray) else Number(float(result))

@@ -64,13 +64,19 @@ def program_heading(code: ProgramCode) -> str:
     return f"armwright {__version__}, program mode, program sha256 {digest}"
 
 
-def program_approximations(code: ProgramCode) -> Iterator[str]:
-    """Give in words what differs from the run on every controller."""
+def program_approximations(code: ProgramCode, *, rounded: bool = True) -> Iterator[str]:
+    """Give in words what differs from the run on every controller.
+
+    Args:
+        code: the program.
+        rounded: whether the language rounds corners by lengths.
+    """
     moves = [one for one in code.everything() if isinstance(one, MoveTo)]
     if moves:
         yield "speeds: the controller has its own profile up to the largest speeds and accelerations of the run"
     if any(len(one.targets) > 1 for one in moves):
-        yield "paths past frames are lines with rounded corners, begun no farther from a corner than in the run"
+        shape = "with rounded corners, begun no farther from a corner than in the run"
+        yield f"paths past frames are lines {shape if rounded else 'at whose corners the arm stops'}"
     if any(
         isinstance(one, Print) and not all(isinstance(item, str) for item in one.items) for one in code.everything()
     ):
