@@ -211,9 +211,10 @@ def _is_corrected(parts: set[Op]) -> bool:
 def _parts_of(code: Code, number: int) -> set[Op]:
     """Return the parts of the MOVE that an instruction is one of."""
     first = last = number
-    while code.instructions[first - 1].op in MOVE_PARTS:
+    steps = code.instructions
+    while first and steps[first - 1].op in MOVE_PARTS:
         first -= 1
-    while code.instructions[last].op in MOVE_PARTS:
+    while last < len(steps) and steps[last].op in MOVE_PARTS:
         last += 1
     return {step.op for step in code.instructions[first:last]}
 
