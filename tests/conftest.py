@@ -47,6 +47,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if (mark := item.get_closest_marker("drawn")) is not None:
             parts[item.nodeid.partition("[")[0], *mark.args].append(item)
+        elif (mark := item.get_closest_marker("part")) is not None:
+            parts[item.nodeid.partition("::")[0], *mark.args].append(item)
         examples = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
         if mark is not None or examples or "sample" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.proof)

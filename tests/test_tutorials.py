@@ -105,7 +105,7 @@ def followed(block: Block, folder: Path, browser: Any) -> str:
 
 
 @pytest.mark.parametrize("page", [HOME, *TUTORIALS], ids=lambda page: page.stem)
-@pytest.mark.drawn(0.6)
+@pytest.mark.drawn(0.4)
 def test_tutorial(page: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     """Who types what a tutorial says, or the first page, in its order, gets the answers it shows."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")

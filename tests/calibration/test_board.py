@@ -19,6 +19,9 @@ from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from calibration.boards import CHARUCO, photographed, random_lens
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 cv2 = pytest.importorskip("cv2")
 
 CHESSBOARD = Board(columns=8, rows=5, square=0.04)

@@ -25,6 +25,9 @@ from armwright.errors import FileFormatError, ShapeError
 from calibration.simulated import LENGTH, configurations, random_arm, random_errors
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 NOISE = 3e-5
 # Half of the readings are with this payload, off the axis of the last joint.
 PAYLOAD = (3.0, 0.08, -0.03, 0.1)

@@ -25,6 +25,9 @@ from calibration.boards import CHARUCO, Scene, board_views, photographed, projec
 from calibration.simulated import random_arm, random_pose
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 cv2 = pytest.importorskip("cv2")
 
 PIXEL_NOISE = 0.1

@@ -13,6 +13,9 @@ from armwright.clearance.simulation import simulate
 from clearance.arms import beginning
 from clearance.exudyn_five_bar import simulated
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 CLEARANCE = 5e-4
 END, EVERY = 0.15, 1e-3
 # The torques jump at 0.05 s, in the middle of what Exudyn takes for one step; from there it is of order 1.

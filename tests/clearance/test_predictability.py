@@ -11,6 +11,9 @@ from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 
 @pytest.mark.share(0.034)
 def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> None:

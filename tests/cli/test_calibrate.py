@@ -13,6 +13,9 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.report.elements import length_text
 from cli_calls import armwright
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 ARM = "puma560"
 
 

@@ -12,6 +12,9 @@ from armwright.report.elements import length_text
 from cli_calls import armwright, check_mistake
 from five_bar_example import CENTRE, PLAY
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 CLEARANCES = [part for name, c in PLAY.items() for part in ("--clearance", f"{name}={c * 1e3:g}")]
 ESTIMATE = {
     "parameters": {

@@ -8,6 +8,9 @@ import pytest
 
 from cli_calls import armwright
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 FILES = {
     "report.html", "samples.csv", "summary.json", "path.svg", "bearings.svg", "error.svg", "spectrum.svg", "forces.svg",
     "energy.svg", "workspace.svg", "run.json",

@@ -11,6 +11,9 @@ from typer.testing import CliRunner
 from armwright.cli.app import app
 from armwright.program.vm import excerpt
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"
 

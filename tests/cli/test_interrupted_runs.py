@@ -21,6 +21,9 @@ from armwright.files.output import RECORD, is_stray, stray_files
 from armwright.files.result_folder import PREFIX
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Whose results a folder holds.
 OLD, NEW, MIX = "old", "new", "mix"

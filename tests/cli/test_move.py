@@ -12,6 +12,9 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion import detour
 from cli_calls import armwright
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 POSES = EXAMPLES / "puma_poses.toml"
 POST = EXAMPLES / "round_the_post.toml"

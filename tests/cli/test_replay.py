@@ -12,6 +12,9 @@ from armwright.errors import ExitStatus
 from cli_calls import armwright
 from files.logs_of_others import NAMES, json_log, mcap_file, motion
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RUN = (EXAMPLES / "stacking.rlo", "--cell", EXAMPLES / "stanford_cell.toml")
 T = np.arange(0, 8, 0.008)

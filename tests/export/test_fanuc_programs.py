@@ -12,6 +12,9 @@ from armwright.export.checkers.fanuc_machine import run as run_files
 from armwright.program import Source
 from export.cases import EXAMPLES
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 CELL = read_cell(EXAMPLES / "lrmate_cell.toml")
 HEAD = """UNITS MM ;
 VAR a, b : FRAME ; n, m : SCALAR ; flag : BOOLEAN ;

@@ -17,6 +17,9 @@ from armwright.identification.identifiability import UNKNOWN
 from armwright.identification.log import Log
 from identification.simulated import fourier, log, noise, truth
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 pytest.importorskip("clarabel", reason="the extra identification is not installed")
 
 

@@ -20,6 +20,9 @@ from armwright.spatial.poses import homogeneous
 from oracles.arms import random_arm, random_configurations
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 # Where the slope is regular the last step leaves nothing but rounding, of arms ten metres long [m] and [rad].
 RESIDUAL = 1e-12
 # Two configurations are equal: a hundred times the rounding where the Jacobian's condition is 1e8.

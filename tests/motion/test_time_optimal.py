@@ -29,6 +29,9 @@ from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.motion.xspline_path import xspline
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 PUMA = load_arm("puma560-seed")
 SPEED, ACCELERATION, EFFORT = PUMA.limits.speed, PUMA.limits.acceleration, PUMA.limits.effort
 ROUNDING = 1e-9

@@ -28,6 +28,9 @@ from armwright.spatial.shapes import Box, Solid
 from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, without_pictures
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 STEP = 1e-3
 # What the law leaves out: the first touch of the pads, and creep.
 LAW, CREEP = 0.05, 1e-6

@@ -24,6 +24,9 @@ from armwright.program.vm.recording import Recording
 from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_pose, placing_error, without_pictures
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 # The block is found where the file says, without pictures.
 NO_CAMERA = (("width = 640\nheight = 480\nfovy_deg = 42\n", ""),)
 RETRIED = PROGRAM.replace("BEGIN\n", "BEGIN\n  TRY\n", 1).replace(

@@ -27,6 +27,9 @@ from oracles.benches import ARMS, HOLD, STOPPING_SPEEDS, TABLE, bench, compiled,
 from oracles.solids import coal_distance, coal_shape, random_shape
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 STIFFNESS = 2e4
 # A pin under the hand: half its height, and the half size of its top [m].
 PIN = (0.02, 0.002)

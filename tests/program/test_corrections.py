@@ -27,6 +27,9 @@ from armwright.program.vm.recording import Recording
 from program.running import code_of, failure, printed
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CELL = """
 [arms.ARM_1]

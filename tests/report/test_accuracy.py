@@ -14,6 +14,9 @@ from armwright.report import accuracy_figures
 from armwright.report.accuracy_figures import accuracy_drawings
 from armwright.report.accuracy_files import accuracy_files
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 NAME = r"P<1>&$\x$"
 
 

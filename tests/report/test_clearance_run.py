@@ -24,6 +24,9 @@ from armwright.report.clearance_run_files import samples_csv
 from armwright.report.clearance_run_page import animation_data, clearance_run_page
 from armwright.report.five_bar_figure import scenario_workspace, workspace_figure
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 # The page writes five significant digits.
 FIVE_DIGITS = 0.5e-4
 # The books of a run in steps of 1e-5 s close to this [J], with 11 J that go through them.

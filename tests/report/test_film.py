@@ -13,6 +13,9 @@ from armwright.report.shape_table import ShapeTable
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.shapes import Box
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 pillow = pytest.importorskip("PIL.Image")
 pytest.importorskip("matplotlib")
 

@@ -34,6 +34,9 @@ from armwright.simulation.simulator import simulate
 from armwright.spatial.shapes import Box, Capsule, Mesh
 from oracles.stocked_cell import stocked_run
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Positions are written to a nanometre, quaternions to 1e-12.
 POSITION, ROTATION = 1e-9, 1e-9

@@ -20,6 +20,9 @@ from armwright.simulation.result import Status
 from cli_calls import armwright
 from oracles.arms import coupled, random_arm
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 FILE = Path(__file__).parents[2] / "examples" / "two_link_springs.toml"
 TWO_LINKS = load_arm(str(FILE))
 FINE = Adaptive(rtol=1e-10, atol=1e-12)

@@ -15,6 +15,9 @@ from armwright.cell.reader import read_cell
 from armwright.studio.page import studio_page
 from armwright.studio.workbench import Workbench
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 pytest.importorskip("websockets")
 CELL = """\
 name = "bench"
@@ -210,7 +213,7 @@ def see_modules(opened: Opened) -> None:
     opened.until(lambda: page.locator("#modules summary").count() == 1)
     assert page.locator("#colours .declaration").all_inner_texts() == ["IMPORT", "CONST"]
     page.locator("#modules summary").click()
-    assert page.locator("#modules .declaration").all_inner_texts() == ["MODULE", "PROCEDURE"]
+    opened.until(lambda: page.locator("#modules .declaration").all_inner_texts() == ["MODULE", "PROCEDURE"])
     page.get_by_role("button", name="Breakpoint in line 4 of lib/ways.rlo").click()
     opened.until(lambda: page.locator("#modules [aria-pressed=true]").count() == 1)
     page.locator("#modules summary").click()

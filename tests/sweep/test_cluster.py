@@ -17,6 +17,9 @@ from armwright.sweep.task import Status
 from armwright.sweep.worker import evaluate_pickled
 from sweep_tasks import Fall, calls_of
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 pytest.importorskip("xarray")
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")

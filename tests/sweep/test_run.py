@@ -21,6 +21,9 @@ from armwright.sweep.runner import run
 from armwright.sweep.task import Axis, Output, Status
 from sweep_tasks import TIMES, Fall, calls_of
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 xr = pytest.importorskip("xarray")
 
 

@@ -18,6 +18,9 @@ from clearance.conftest import RANGE
 from cli_calls import armwright
 from samples import Sample
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 EXAMPLE = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
 # Up to here a fault is small enough that its shift of the tip is proportional to it.
 SMALL = {"1": 0.5, "m": 2e-3, "rad": 5e-3}

@@ -21,6 +21,9 @@ from armwright.clearance.reader import load_linkage
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 # Mean of 50 readings with 10 µm each, and the measure that the thesis' way is held against [m, %].
 DWELL_NOISE = 10e-6 / np.sqrt(50)
 WITHOUT_NOISE, WITH_NOISE = 99.5, 99.0

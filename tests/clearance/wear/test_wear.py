@@ -20,6 +20,9 @@ from armwright.clearance.wear.worn_stroke import Stroke, tip_errors
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces, mean_growth
 from armwright.errors import InvalidValueError
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 RADIUS, CLEARANCE, FORCE, TURNS = 0.01, 2e-4, 25.0, 3
 # Of sums in double precision.
 ROUNDING = 1e-12

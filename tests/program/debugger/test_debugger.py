@@ -14,6 +14,9 @@ from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.machine import Limits
 from program.running import cell_of, code_of, corpus_text, down
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"
 CALLS = (
     "PROCEDURE add(k : SCALAR, p : FRAME) ;\nVAR double : SCALAR ;\nBEGIN\n  double = 2 * k ;\n"

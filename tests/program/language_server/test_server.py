@@ -23,6 +23,9 @@ from armwright.files.message_stream import MessageStream
 from armwright.program.language_server.handlers import RloServer
 from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 CELL = """
 name = "bench"
 [arms.ARM_1]
