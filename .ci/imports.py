@@ -9,10 +9,13 @@ import armwright
 # Modules that cannot be imported without an extra; all others import a heavy library only when it is used.
 _OF_EXTRAS = ("pygls", "lsprotocol")
 
+# What `armwright clearance export` writes for users of Exudyn, and does not import.
+_SCRIPTS = (".__main__", ".run_linkage")
+
 core = "core" in sys.argv[1:]
 modules = [module.name for module in pkgutil.walk_packages(armwright.__path__, "armwright.")]
 for name in modules:
-    if name.endswith(".__main__"):
+    if name.endswith(_SCRIPTS):
         continue
     try:
         importlib.import_module(name)
