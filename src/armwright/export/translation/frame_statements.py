@@ -60,12 +60,15 @@ def _displace(context: Context, variable: Variable, value: Value, others: Sequen
     if len(known) > _MOST_MOVED:
         text = f"{len(known)} frames move with this one, and each would be a line"
         context.refuse(span, text, "they move here", code="E620")
-    if known:
-        change = context.declare("CHANGE OF FRAME", "pose")
-        context.assign(change, simplified("compose", (value, simplified("inverse", (variable,)))), span)
-        for one in known:
-            context.assign(one, simplified("compose", (change, one)), span)
+    if not known:
+        context.assign(variable, value, span)
+        return
+    change = context.declare("CHANGE OF FRAME", "pose")
+    context.assign(change, simplified("compose", (value, simplified("inverse", (variable,)))), span)
+    # Before the others: the value may be that of one of them, where it is now.
     context.assign(variable, value, span)
+    for one in known:
+        context.assign(one, simplified("compose", (change, one)), span)
 
 
 def _declared(context: Context, name: str) -> list[Variable]:
