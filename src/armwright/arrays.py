@@ -17,6 +17,8 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 ArrayLike: TypeAlias = npt.ArrayLike
+# Numbers of rows, from 0 or 1.
+Numbers: TypeAlias = npt.NDArray[np.intp]
 Flags: TypeAlias = npt.NDArray[np.bool_]
 
 # Larger than any quantity of a robot; products of three such numbers are still finite.
@@ -116,6 +118,21 @@ def integer(value: int, what: str, *, least: int) -> int:
     if result < least:
         raise InvalidValueError(f"{what}: expected an integer of at least {least}, got {result}")
     return result
+
+
+def evenly_spread(count: int, most: int, what: str = "most") -> Numbers:
+    """Return numbers of rows, at most so many of ``count``, evenly spread, the first and the last among them.
+
+    Args:
+        count: of the rows.
+        most: how many numbers at most, 2 at least.
+        what: name of ``most`` in a message.
+
+    Raises:
+        KindError: ``most`` is not an integer.
+        InvalidValueError: it is below 2.
+    """
+    return np.linspace(0, count - 1, min(count, integer(most, what, least=2))).round().astype(np.intp)
 
 
 def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:

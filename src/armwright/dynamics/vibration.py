@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, floats, integer, joint_array
+from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, floats, joint_array
 from armwright.dynamics.flexible_joints import Modes, deflection, joint_stiffness, modes, tool_compliance
 from armwright.errors import ShapeError, TooFewError
 from armwright.files.result_table import ResultTable
@@ -39,7 +39,7 @@ class VibrationAssessment:
 
     arm: Arm
     q: Array
-    numbers: Array
+    numbers: Numbers
     given: int
     moving: bool
     modes: Modes
@@ -176,7 +176,7 @@ def assess_vibration(
     every = np.atleast_2d(joint_array(q, arm.n))
     if not len(every):
         raise TooFewError("expected a configuration at least")
-    rows = np.linspace(0, len(every) - 1, min(len(every), integer(most, "most", least=2))).round().astype(int)
+    rows = evenly_spread(len(every), most)
     motion = None
     if qd is not None and qdd is not None:
         speeds, accelerations = (

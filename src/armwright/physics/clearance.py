@@ -16,19 +16,16 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike
+from armwright.arrays import Array, ArrayLike, Numbers
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.cell_bodies import Body
 from armwright.physics.distances import TOLERANCE, Distances
 from armwright.spatial.shapes import farthest
-
-Numbers: TypeAlias = npt.NDArray[np.intp]
 
 # Pairs that may come closer by no more than this are decided by their distance [m].
 RESOLUTION = 0.5e-3

@@ -136,6 +136,9 @@ class CellCollisions:
             name: PlacedArm(_PlainArm(arm) if isinstance(arm, Arm) else arm, cell.arms[name].base)
             for name, arm in compiled.items()
         }
+        self._slides = {
+            name: PlacedArm(_PlainArm(slide(name)), slide_base(frame)) for name, frame in cell.moving_frames.items()
+        }
         at_start = PartPoses.standing(cell)
         bodies = self._bodies.arranged(at_start)
         pairs = self._bodies.pairs(bodies)
@@ -306,9 +309,8 @@ class CellCollisions:
             if move.arm in (bodies[i].arm, bodies[j].arm) and (i, j) not in self._left_out
         ]
         frames = self._cell.moving_frames
-        slides = {name: PlacedArm(_PlainArm(slide(name)), slide_base(frame)) for name, frame in frames.items()}
         courses = {name: frame_course(frame, now, move.trajectory.duration) for name, frame in frames.items()}
-        checker = self._checker.rearranged(bodies, pairs, slides)
+        checker = self._checker.rearranged(bodies, pairs, self._slides)
         motions = {**others, **courses, move.arm: move.trajectory}
         known = list(zip(bodies, self._bodies.roles, strict=True))
         around = Surroundings(checker, motions, known, pairs, beside)

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.arrays import Array
-from armwright.physics.clearance import ClearanceChecker, Numbers
+from armwright.arrays import Array, Numbers
+from armwright.physics.clearance import ClearanceChecker
 from armwright.physics.distances import TOLERANCE
 from armwright.spatial.shapes import box_about
 

@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, Flags
+from armwright.arrays import Array, Flags, Numbers
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory
 from armwright.physics.cell_bodies import Body
-from armwright.physics.clearance import ClearanceChecker, Closest, Numbers, Window
+from armwright.physics.clearance import ClearanceChecker, Closest, Window
 from armwright.physics.placed_bodies import Role
 from armwright.physics.planned_move import PlannedMove
 

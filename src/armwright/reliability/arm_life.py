@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import attrs
 import numpy as np
-import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, integer, joint_array, not_negative, positive, read_only
+from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, joint_array, not_negative, positive, read_only
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.jacobians import jacobian
@@ -19,7 +18,6 @@ from armwright.reliability.life_file import LifeFile, PlayGrowth
 from armwright.reliability.play_life import PlayLife, WearRates, play_life
 from armwright.reliability.reducer_life import Load, Rating, life_hours, load_of
 
-Rows: TypeAlias = npt.NDArray[np.intp]
 # Of the lives of components, and of the repeatability, what these parts of arms do not reach.
 QUANTILES = (0.05, 0.1, 0.5, 0.95)
 # Part of the components that the life of their rating is reached by: L10.
@@ -93,10 +91,10 @@ class ArmLife:
     slope: float
     work: Array
     q: Array
-    numbers: Rows
+    numbers: Numbers
     resting: bool
     visited: Array
-    visited_numbers: Rows
+    visited_numbers: Numbers
     plays: dict[int, PlayGrowth]
     rates: WearRates | None = None
     limit: float | None = None
@@ -125,7 +123,7 @@ class ArmLife:
         return np.asarray(_RATED ** (t**self.slope))
 
     @cached_property
-    def telling(self) -> tuple[Rows, Array]:
+    def telling(self) -> tuple[Numbers, Array]:
         """For each joint the visited pose, from 0, where its play has the largest part in the variance; this part."""
         squares = (jacobian(self.arm, self.visited)[:, :3] ** 2).sum(axis=1)
         first = np.array([self.plays[i].first if i in self.plays else 0.0 for i in range(self.arm.n)])
@@ -359,8 +357,8 @@ class RepeatedMotion:
         return np.asarray(np.trapezoid(np.abs(self.effort * self.qd), self.t, axis=0))
 
     @property
-    def rests(self) -> Rows:
-        """Rows, from 0, where the arm rests, of every stay its slowest."""
+    def rests(self) -> Numbers:
+        """Numbers, from 0, where the arm rests, of every stay its slowest."""
         speeds = np.abs(self.qd)
         fastest = speeds.max(axis=0)
         slowness = (speeds / np.where(fastest > 0, fastest, 1.0)).max(axis=1)
@@ -404,8 +402,8 @@ def assess_life(
         hours = life_hours(rating, load)
         components.append(ComponentLife(joint=joint, name=name, rating=rating, load=load, hours=hours))
     components.sort(key=lambda one: one.hours)
-    every, rests = _spread(np.arange(len(positions)), most), motion.rests
-    rows = _spread(rests, most) if len(rests) else every
+    every, rests = evenly_spread(len(positions), most), motion.rests
+    rows = rests[evenly_spread(len(rests), most)] if len(rests) else every
     life = ArmLife(
         arm=arm,
         cycle=motion.cycle,
@@ -434,12 +432,6 @@ def assess_life(
     play = play_life(arm, life.q, first, rates, limit, samples=samples, seed=seed)
     drawn = rates.sample(samples, np.random.default_rng(seed))
     return attrs.evolve(life, rates=rates, limit=limit, play=play, curve=_curve(life, play, first, drawn))
-
-
-def _spread(rows: Rows, most: int) -> Rows:
-    """Return at most so many of some rows, evenly spread."""
-    count = min(len(rows), integer(most, "most", least=2))
-    return np.asarray(rows[np.linspace(0, len(rows) - 1, count).round().astype(int)])
 
 
 def _rates(arm: Arm, stated: LifeFile, work: Array) -> WearRates | None:

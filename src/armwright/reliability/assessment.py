@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, integer, joint_array, positive
+from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, integer, joint_array, positive
 from armwright.errors import InvalidValueError, TooFewError
 from armwright.files.result_table import ResultTable
 from armwright.reliability.allocation import Allocation, Rule, allocate, error_bounds
@@ -57,7 +57,7 @@ class ToleranceAssessment:
 
     arm: Arm
     q: Array
-    numbers: Array
+    numbers: Numbers
     given: int
     tolerances: tuple[Tolerance, ...]
     error: LinearError
@@ -238,7 +238,7 @@ def assess_tolerances(
     every = np.atleast_2d(joint_array(q, arm.n))
     if not len(every) or not tolerances:
         raise TooFewError("expected a configuration and a tolerance at least")
-    rows = np.linspace(0, len(every) - 1, min(len(every), integer(most, "most", least=2))).round().astype(int)
+    rows = evenly_spread(len(every), most)
     configurations = every[rows]
     if integer(samples, "samples", least=1) * len(rows) > _SAMPLED:
         raise InvalidValueError(

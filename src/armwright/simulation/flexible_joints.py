@@ -12,7 +12,7 @@ Source:
 
 from __future__ import annotations
 
-import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
@@ -36,6 +36,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.simulation.controllers import Controller, Reference
 from armwright.simulation.integrators import Adaptive, Integrator
 from armwright.simulation.result import Status
+from armwright.simulation.sample_times import check_samples, sample_times
 
 # More samples than this would exhaust the memory.
 _MAX_SAMPLES = 10**6
@@ -181,11 +182,7 @@ def simulate_flexible(
     start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
     duration, period = positive(duration, "duration", "s"), positive(period, "period", "s")
-    if duration / period > _MAX_SAMPLES:
-        raise InvalidValueError(
-            f"duration: {duration:g} s, one sample every {period:g} s, would be {duration / period:.3g} samples; "
-            f"expected at most {_MAX_SAMPLES:g}: make the duration shorter or the period longer"
-        )
+    check_samples(duration, period, _MAX_SAMPLES)
     _check_pace(arm, start, duration, driven=motors is None)
     if motors is not None:
         if controller is not None or theta is not None:
@@ -251,7 +248,7 @@ class _Moment(NamedTuple):
     heat: float
 
 
-class _Plant:
+class _Plant(ABC):
     """The equations of an arm whose state y begins with q and q', and ends with work and heat."""
 
     def __init__(self, arm: Arm) -> None:
@@ -265,9 +262,9 @@ class _Plant:
         if can_be_compiled():
             self.mass_and_bias = compile_arm(self.links, quickly=True).mass_and_bias
 
+    @abstractmethod
     def moment(self, t: float, y: Array) -> _Moment:
         """Return everything at a time."""
-        raise NotImplementedError
 
     def transmitted(self, q: Array, qd: Array, theta: Array, thetad: Array) -> Array:
         """Return the efforts of flexible gears on their links."""
@@ -348,11 +345,7 @@ def _mass_and_bias(links: Arm, q: Array, qd: Array) -> tuple[Array, Array]:
 
 
 def _run(plant: _Plant, y: Array, duration: float, period: float, integrator: Integrator) -> FlexibleSimulation:
-    count = math.floor(duration / period + _CRUMB)
-    times = [*(period * np.arange(count + 1)).tolist()]
-    if duration - times[-1] > _CRUMB * period:
-        times.append(duration)
-    times[-1] = duration
+    times = sample_times(duration, period)
     samples, status, reached = [(0.0, y)], Status.FINISHED, 0.0
     for step in integrator.steps(plant.slope, 0.0, y, duration):
         if not np.isfinite(step.state).all() or np.abs(step.state[:-2]).max() > LARGEST_ANGLE:

@@ -9,7 +9,6 @@ one answer (``solve_complementarity``), so nothing chatters and no speed creeps.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -28,12 +27,11 @@ from armwright.simulation.controllers import Controller, no_effort
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.simulation.plant import Moment, Phase, Plant, Start
 from armwright.simulation.result import Brake, Event, JointState, Simulation, Status
+from armwright.simulation.sample_times import check_samples, sample_times
 
 # So many events within so short a time [s] are an entanglement.
 _ENTANGLED = 50
 _INSTANT = 1e-9
-# Part of a period that rounding may shift a sample by.
-_CRUMB = 1e-9
 # More samples than this would exhaust the memory.
 _MAX_SAMPLES = 10**7
 # No position or speed of a robot is as large; of larger angles no sine means anything.
@@ -85,11 +83,7 @@ def simulate(
     start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
     duration, period = positive(duration, "duration", "s"), positive(period, "period", "s")
-    if duration / period > _MAX_SAMPLES:
-        raise InvalidValueError(
-            f"duration: {duration:g} s, one sample every {period:g} s, would be {duration / period:.3g} samples; "
-            f"expected at most {_MAX_SAMPLES:g}: make the duration shorter or the period longer"
-        )
+    check_samples(duration, period, _MAX_SAMPLES)
     _check_kinds(controller, integrator, brakes)
     unlimited = np.full(arm.n, np.inf)
     plant = Plant(
@@ -168,11 +162,7 @@ class _Run:
 
     def __init__(self, plant: Plant, integrator: Integrator, duration: float, period: float) -> None:
         self._plant, self._integrator = plant, integrator
-        count = math.floor(duration / period + _CRUMB)
-        times = period * np.arange(count + 1)
-        remainder = duration - times[-1]
-        self._times: list[float] = [*times.tolist(), *([duration] if remainder > _CRUMB * period else [])]
-        self._times[-1] = duration
+        self._times = sample_times(duration, period)
         changes = {time for brake in plant.brakes for time in (brake.start, brake.end) if 0 < time < duration}
         self._ends = [*sorted(changes), duration]
         self._samples: list[_Sample] = []

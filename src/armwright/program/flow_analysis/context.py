@@ -98,6 +98,24 @@ class Context:
         state.ended = False
         return outcome
 
+    def otherwise(self, node: tree.Wait | tree.WaitUntil | tree.Put, message: str, advice: str) -> None:
+        """Analyse what the ELSE of a statement says, which may be done or not.
+
+        Args:
+            node: the statement.
+            message: of a variable that gets its value there only.
+            advice: what to do then.
+        """
+        state, part = self.state, node.otherwise
+        if part is None:
+            return
+        if state.is_first_pass:
+            state.forget(self.side_effects(node))
+            return
+        with state.conditional():
+            outcomes = (self.path(part), self.path())
+        self.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
+
     def merge(self, *outcomes: Outcome | None, divergence: Divergence | None = None) -> None:
         """Merge paths; the path ends where none of them arrives.
 

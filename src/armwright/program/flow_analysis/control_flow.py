@@ -238,17 +238,9 @@ def wait_until(context: Context, node: tree.WaitUntil) -> None:
 
 def _late(context: Context, node: tree.Wait | tree.WaitUntil) -> None:
     """Analyse what may run where what is waited for does not come in time."""
-    state = context.state
-    require_value(state, node.limit)
-    if node.otherwise is None:
-        return
-    if state.is_first_pass:
-        state.forget(context.side_effects(node))
-        return
+    require_value(context.state, node.limit)
     message, advice = "it gets a value only where this WAIT ends too late", "give it a value before the WAIT"
-    with state.conditional():
-        outcomes = (context.path(node.otherwise), context.path())
-    context.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
+    context.otherwise(node, message, advice)
 
 
 def raise_(context: Context, node: tree.Raise) -> None:

@@ -30,15 +30,8 @@ def put(context: Context, node: tree.Put) -> None:
     require_value(state, node.frame)
     plausibility.check_lengths(state, node.frame)
     _run_by_queue(state, node.arm, node.head)
-    if node.otherwise is None:
-        return
-    if state.is_first_pass:
-        state.forget(context.side_effects(node))
-        return
     message, advice = "it gets a value only where this queue is full", "give it a value before the PUT"
-    with state.conditional():
-        outcomes = (context.path(node.otherwise), context.path())
-    context.merge(*outcomes, divergence=state.divergence(node.head, message, advice))
+    context.otherwise(node, message, advice)
 
 
 def _run_by_queue(state: FlowState, arm: tree.Mobile, span: Span) -> None:

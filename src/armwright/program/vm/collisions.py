@@ -223,23 +223,16 @@ def check_others(machine: Machine, stopped: str) -> None:
     """
     if machine.collisions is None:
         return
-    for process in machine.state.processes:
-        motion = process.motion
-        if motion is None or motion.arm == stopped or motion.rest_tick is not None or motion.threat is not None:
+    moving = [process.motion for process in machine.state.processes if process.motion is not None]
+    # Others go on along their queues, or with frames, while their processes do other things.
+    for motion in (*(it for it in moving if it.rest_tick is None), *machine.state.following.values()):
+        if motion.arm == stopped or motion.threat is not None:
             continue
         rest = _rest_of_stage(machine, motion.arm)
         stages = [*([] if rest is None else [rest]), *(stage.planned.trajectory for stage in motion.stages)]
         if not stages:
             continue
         collision = _check(machine, _rest_of_move(machine, motion, stages), clearances=False).collision
-        if collision is not None and collision.other_arm == stopped:
-            motion.threat = Threat(machine.state.ticks, collision, stopped)
-    for arm, motion in machine.state.following.items():
-        # It goes on along its queue, or with a frame, while its process does other things.
-        rest = _rest_of_stage(machine, arm)
-        if arm == stopped or motion.threat is not None or rest is None:
-            continue
-        collision = _check(machine, _rest_of_move(machine, motion, [rest]), clearances=False).collision
         if collision is not None and collision.other_arm == stopped:
             motion.threat = Threat(machine.state.ticks, collision, stopped)
 
