@@ -5,15 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
-from armwright.cell.simulator import Simulator
-from armwright.dynamics import inverse_dynamics
 from armwright.export import ExportError, export_run
-from armwright.kinematics import forward
 from armwright.motion.corrected_line import NEAR
-from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.program import Source, run
 from armwright.program.formatter.format import formatted
 from armwright.program.language.position_codec import PositionCodec
@@ -21,10 +16,8 @@ from armwright.program.language_server.analysis import Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
-from armwright.program.vm.interpreter import advance, next_process
-from armwright.program.vm.machine import Machine
 from armwright.program.vm.recording import Recording
-from program.running import code_of, failure, printed
+from program.running import check_going_back, check_ticks, failure, printed, tool_positions
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
@@ -56,24 +49,6 @@ def ran(text: str, cell: Cell) -> Recording:
     return run(Source("seam.rlo", f"{START} {text} END."), cell)
 
 
-def tool(recording: Recording) -> Array:
-    """Positions of the tool at the ticks (k, 3)."""
-    placed = recording.cell.arms["ARM_1"]
-    return np.asarray((placed.base @ forward(placed.arm, recording.streams[0].q))[:, :3, 3])
-
-
-def check_limits(recording: Recording) -> None:
-    """Positions, speeds, accelerations and efforts keep their limits at every tick; speeds do not jump."""
-    arm, (stream,) = recording.cell.arms["ARM_1"].arm, recording.streams
-    limits, period = arm.all_limits, recording.cell.period
-    assert ((stream.q >= arm.limits.lower) & (stream.q <= arm.limits.upper)).all()
-    assert (np.abs(limited_positions(arm, stream.qd)) <= limits.speed * (1 + 1e-6)).all()
-    assert (np.abs(limited_positions(arm, stream.qdd)) <= limits.acceleration * (1 + 1e-6)).all()
-    assert (np.abs(np.diff(stream.qd, axis=0)) / period <= arm.limits.acceleration * (1 + 1e-3) + 1e-6).all()
-    tau = inverse_dynamics(arm, stream.q, stream.qd, stream.qdd)
-    assert (np.abs(limited_efforts(arm, tau)) <= limits.effort * (1 + 1e-3)).all()
-
-
 @pytest.mark.share(0.05)
 def test_random_sensors(tmp_path: Path, sample: Sample) -> None:
     """Whatever the sensor says, the path is within bound, rate and limits, and comes to what it says."""
@@ -87,8 +62,8 @@ def test_random_sensors(tmp_path: Path, sample: Sample) -> None:
         speed = f"WITH VELOCITY = {random.uniform(30, 90):.1f}"
         recording = ran(f"MOVE ARM_1 TO g STRAIGHTLY, {speed}, {clauses} ;", cell(tmp_path, str(timeline), arm))
 
-        check_limits(recording)
-        x, _, z = (tool(recording) - FROM).T
+        check_ticks(recording)
+        x, _, z = (tool_positions(recording) - FROM).T
         period, t = recording.cell.period, recording.streams[0].t
         assert np.abs(z).max() <= NEAR + 1e-5
         assert np.abs(x).max() <= (np.abs(values).max() + 0.01) * 1e-3
@@ -111,18 +86,18 @@ def test_where_it_ends(tmp_path: Path) -> None:
     assert stage.motion.duration == pytest.approx(recording.duration, abs=1e-9)
     (move,) = (effect for effect in recording.effects if effect.kind == "MOVE")
     assert move.data["largest_correction"] >= 0.004
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_without_a_sensor(tmp_path: Path) -> None:
     """A correction of 0 is the line itself; what is worked out counts, with the units of the program."""
     straight = ran("MOVE ARM_1 TO g STRAIGHTLY, WITH CORRECTION = 0, WITH BOUND = 1, WITH RATE = 1 ;", cell(tmp_path))
-    assert np.abs(tool(straight)[:, 0] - 0.40).max() <= 1e-3
+    assert np.abs(tool_positions(straight)[:, 0] - 0.40).max() <= 1e-3
 
     clauses = "WITH CORRECTION = n + 2mm, WITH BOUND = 5.5, WITH RATE = 50"
     moved = ran(f"n = 3 ; MOVE ARM_1 TO g STRAIGHTLY, {clauses} ;", cell(tmp_path))
-    assert tool(moved)[-1] == pytest.approx([0.405, 0.15, 0.25], abs=1e-5)
-    check_limits(moved)
+    assert tool_positions(moved)[-1] == pytest.approx([0.405, 0.15, 0.25], abs=1e-5)
+    check_ticks(moved)
 
 
 @pytest.mark.drawn(0.34)
@@ -149,7 +124,7 @@ def test_what_cannot_be_followed(tmp_path: Path, text: str, code: str, says: str
     assert says in error.diagnostic.message
     assert error.recording is not None
     recording = error.recording()
-    check_limits(recording)
+    check_ticks(recording)
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
     for stage in recording.stages:
         assert np.abs(stage.motion(stage.motion.duration, 1)).max() <= 1e-6
@@ -173,7 +148,7 @@ def test_with_other_clauses(tmp_path: Path, text: str) -> None:
     recording = ran(text, cell(tmp_path))
 
     assert printed(recording) == ["true"]
-    check_limits(recording)
+    check_ticks(recording)
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
 
 
@@ -183,25 +158,17 @@ def test_a_guard_ends_it(tmp_path: Path) -> None:
     recording = ran(f"MOVE ARM_1 TO g STRAIGHTLY, WITH SPEED = 10, {clauses} ; PAUSE 1 ;", cell(tmp_path))
 
     (move,) = (effect for effect in recording.effects if effect.kind == "MOVE")
-    x, period = tool(recording)[:, 0], recording.cell.period
+    x, period = tool_positions(recording)[:, 0], recording.cell.period
     crossed = int((x > 0.403).argmax()) * period
     assert crossed <= move.t1 <= crossed + 0.2
     assert np.ptp(x[round(move.t1 / period) :]) <= 1e-9
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_going_back(tmp_path: Path) -> None:
     """A copy of a machine in the middle of a corrected path goes on as the machine itself does."""
     here = cell(tmp_path)
-    machine = Machine(code_of(f"{START} MOVE ARM_1 TO g STRAIGHTLY, {SENSED} ; END.", here), here, Simulator(here))
-    while machine.now < 0.35:
-        advance(machine, next_process(machine))
-    copied = machine.copy()
-    for one in (machine, copied):
-        while not one.state.has_ended:
-            advance(one, next_process(one))
-
-    assert np.array_equal(machine.recording().streams[0].q, copied.recording().streams[0].q)
+    check_going_back(f"{START} MOVE ARM_1 TO g STRAIGHTLY, {SENSED} ; END.", here, lambda machine: machine.now >= 0.35)
 
 
 def test_names_and_variables(tmp_path: Path) -> None:
@@ -244,4 +211,4 @@ def test_the_example() -> None:
     first, second = printed(recording)
     assert first == "welded, at the end -4 beside the line"
     assert "is 30 mm, outside of its bound" in second
-    check_limits(recording)
+    check_ticks(recording)

@@ -10,11 +10,8 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.dynamics import inverse_dynamics
 from armwright.export import ExportError, export_run
-from armwright.kinematics import forward
 from armwright.motion.frame_queue import NEAR
-from armwright.motion.limited import limited_efforts, limited_positions
 from armwright.physics.world import PhysicsCell
 from armwright.program import Limits, Source, compile as translate, known_cell, run
 from armwright.program.debugger.snapshot import StackFrame
@@ -29,7 +26,7 @@ from armwright.program.language_server.hover import hover
 from armwright.program.vm.interpreter import advance, next_process
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.recording import Recording
-from program.running import code_of, failure, printed
+from program.running import check_going_back, check_ticks, code_of, failure, printed, tool_positions
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
@@ -68,33 +65,14 @@ def ran(text: str, cell: Cell) -> Recording:
     return run(Source("queue.rlo", f"{START} {text} END."), cell)
 
 
-def check_limits(recording: Recording) -> None:
-    """Speeds, accelerations and efforts keep their limits at every tick, and speeds do not jump."""
-    arm, (stream,) = recording.cell.arms["ARM_1"].arm, recording.streams
-    limits = arm.all_limits
-    assert (np.abs(limited_positions(arm, stream.qd)) <= limits.speed * (1 + 1e-6)).all()
-    jumps = np.abs(np.diff(limited_positions(arm, stream.qd), axis=0)) / recording.cell.period
-    assert (jumps <= limits.acceleration * (1 + 1e-3) + 1e-6).all()
-    tau = inverse_dynamics(arm, stream.q, stream.qd, stream.qdd)
-    assert (np.abs(limited_efforts(arm, tau)) <= limits.effort * (1 + 1e-3)).all()
-
-
 def off_the_legs(recording: Recording, corners: Array) -> Array:
     """How far the tool is from straight legs between positions (k, 3), at every tick [m]."""
-    placed = recording.cell.arms["ARM_1"]
-    p = (placed.base @ forward(placed.arm, recording.streams[0].q))[:, :3, 3]
-    off = []
+    p, off = tool_positions(recording), []
     for A, B in pairwise(corners):
         along = (B - A) / max(float((B - A) @ (B - A)), 1e-30)
         s = np.clip((p - A) @ along, 0.0, 1.0)
         off.append(np.linalg.norm(p - A - s[:, None] * (B - A), axis=1))
     return np.asarray(np.min(off, axis=0))
-
-
-def tool(recording: Recording) -> Array:
-    """Positions of the tool at the ticks (k, 3)."""
-    placed = recording.cell.arms["ARM_1"]
-    return np.asarray((placed.base @ forward(placed.arm, recording.streams[0].q))[:, :3, 3])
 
 
 @pytest.mark.share(0.05)
@@ -113,11 +91,11 @@ def test_random_programs(ur5: Cell, sample: Sample) -> None:
         recording = ran(f"QUEUE ARM_1 {clauses} DO BEGIN {steps} END ;", ur5)
 
         assert set(printed(recording)) == {"true"}
-        check_limits(recording)
+        check_ticks(recording)
         # The tool of the cell points down, so its y and z are reversed.
         corners = np.array([0.40, 0.00, 0.25]) + np.array(way) * (1e-3, -1e-3, -1e-3)
         assert off_the_legs(recording, corners).max() <= 3 / 8 * blend * 1e-3 + NEAR
-        assert np.linalg.norm(tool(recording)[-1] - corners[-1]) <= NEAR
+        assert np.linalg.norm(tool_positions(recording)[-1] - corners[-1]) <= NEAR
         assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
     sample.record("programs with queues", sample.count(30), 0)
 
@@ -127,12 +105,12 @@ def test_it_never_stops_while_it_is_fed(ur5: Cell) -> None:
     loop = "FOR n = 1 TO 12 DO PUT f * XYZ(0, 90 * SIN(n * 40), 90 * COS(n * 40) - 90) TO ARM_1 ;"
     recording = ran(f"QUEUE ARM_1 WITH CAPACITY = 3, WITH BLEND = 15 DO {loop}", ur5)
 
-    speed = np.linalg.norm(np.diff(tool(recording), axis=0), axis=1) / recording.cell.period
+    speed = np.linalg.norm(np.diff(tool_positions(recording), axis=0), axis=1) / recording.cell.period
     assert (speed[100:-100] > 0.05).all()
     (queue,) = (effect for effect in recording.effects if effect.kind == "QUEUE")
     assert queue.data["run_dry"] == 0
     assert queue.text == "ARM_1 QUEUE: 12 frames"
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_running_dry(ur5: Cell) -> None:
@@ -146,7 +124,7 @@ def test_running_dry(ur5: Cell) -> None:
     assert printed(recording) == ["0 60", "true"]
     speed = np.abs(recording.streams[0].qd).max(axis=1)
     assert speed[round(1.9 / recording.cell.period)] == 0
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_a_full_queue_waits_or_refuses(ur5: Cell) -> None:
@@ -166,7 +144,7 @@ def test_a_full_queue_waits_or_refuses(ur5: Cell) -> None:
     )
 
     assert printed(recording) == ["full 0", "2 2 -40 -80", "true 2 -80 -120", "true"]
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_the_order_of_processes(tmp_path: Path) -> None:
@@ -212,10 +190,10 @@ def test_what_goes_wrong(ur5: Cell, text: str, code: str, says: str) -> None:
     assert says in error.diagnostic.message
     assert error.recording is not None
     recording = error.recording()
-    check_limits(recording)
+    check_ticks(recording)
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
     recovered = ran(f"TRY {text} RECOVER n = 1 END ; MOVE ARM_1 TO f ; QUEUE ARM_1 DO feed(20) ;", ur5)
-    check_limits(recovered)
+    check_ticks(recovered)
     assert recovered.failure is None
 
 
@@ -233,8 +211,8 @@ def test_an_error_inside_of_the_queue(ur5: Cell) -> None:
     )
 
     assert printed(recording) == ["0", "1", "true"]
-    assert tool(recording)[:, 1].min() > -0.15
-    check_limits(recording)
+    assert tool_positions(recording)[:, 1].min() > -0.15
+    check_ticks(recording)
 
 
 @pytest.mark.drawn(0.34)
@@ -255,7 +233,7 @@ def test_what_ends_it(ur5: Cell, text: str) -> None:
 
     assert recording.failure is None
     assert np.abs(recording.streams[0].qd[-1]).max() <= 1e-6
-    check_limits(recording)
+    check_ticks(recording)
 
 
 LOOP = "FOR n = 1 TO 6 DO PUT f * XYZ(0, 60 * SIN(n * 60), 60 * COS(n * 60) - 60) TO ARM_1"
@@ -274,12 +252,12 @@ def test_an_interrupt_brakes_and_resumes(ur5: Cell, sample: Sample) -> None:
         if stood:
             ticks = slice(round(stood[0] / period) + 1, round(stood[1] / period))
             assert np.abs(recording.streams[0].qd[ticks]).max() <= 1e-9
-        check_limits(recording)
+        check_ticks(recording)
         angles = np.radians(60 * np.arange(7))
         way = np.stack([0 * angles, 0.06 * np.sin(angles), 0.06 * np.cos(angles) - 0.06], axis=1)
         corners = np.array([0.40, 0.00, 0.25]) + way * (1, -1, -1)
         assert off_the_legs(recording, corners).max() <= 3 / 8 * 0.01 + NEAR
-        assert np.linalg.norm(tool(recording)[-1] - corners[-1]) <= NEAR
+        assert np.linalg.norm(tool_positions(recording)[-1] - corners[-1]) <= NEAR
     sample.record("queues braked by interrupts", sample.count(20), 0)
 
 
@@ -299,14 +277,14 @@ def test_what_an_interrupt_leaves(ur5: Cell, action: str, line: str) -> None:
     recording = ran(f"QUEUE ARM_1 DO BEGIN {body} END ; MOVE ARM_1 TO f ; PRINT(DIST(ARM_1, f) < 0.01) ;", ur5)
 
     assert " ".join(printed(recording)) == line
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_velocity(ur5: Cell) -> None:
     """VELOCITY is the speed of the tool on the legs."""
     recording = ran("QUEUE ARM_1 WITH VELOCITY = 80 DO BEGIN feed(100) ; feed(200) END ;", ur5)
 
-    speed = np.linalg.norm(np.diff(tool(recording), axis=0), axis=1) / recording.cell.period
+    speed = np.linalg.norm(np.diff(tool_positions(recording), axis=0), axis=1) / recording.cell.period
     assert speed.max() == pytest.approx(0.08, rel=1e-3)
 
 
@@ -333,15 +311,7 @@ def test_with_physics(tmp_path: Path) -> None:
 def test_going_back(ur5: Cell) -> None:
     """A copy of a machine in the middle of a queue goes on as the machine itself does."""
     text = f"{START} QUEUE ARM_1 WITH CAPACITY = 2 DO FOR n = 1 TO 5 DO feed(20 * n) ; END."
-    machine = Machine(code_of(text, ur5), ur5, Simulator(ur5))
-    while machine.now < 0.2:
-        advance(machine, next_process(machine))
-    copied = machine.copy()
-    for one in (machine, copied):
-        while not one.state.has_ended:
-            advance(one, next_process(one))
-
-    assert np.array_equal(machine.recording().streams[0].q, copied.recording().streams[0].q)
+    check_going_back(text, ur5, lambda machine: machine.now >= 0.2)
 
 
 def test_names_and_variables(ur5: Cell) -> None:
@@ -422,7 +392,7 @@ def test_the_example() -> None:
     lines = printed(recording)
     assert lines[12].endswith("s, true")
     assert lines[-1].endswith("2 points refused")
-    check_limits(recording)
+    check_ticks(recording)
 
 
 def test_what_is_grasped_on_the_way(tmp_path: Path) -> None:

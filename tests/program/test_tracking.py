@@ -21,10 +21,9 @@ from armwright.program.language_server.analysis import Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
-from armwright.program.vm.interpreter import advance, interpret, next_process
-from armwright.program.vm.machine import Machine
+from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.recording import Recording
-from program.running import code_of, failure, printed
+from program.running import check_going_back, failure, printed
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -280,15 +279,7 @@ def test_going_back(tmp_path: Path) -> None:
     """A copy of a machine in the middle of following goes on as the machine itself does."""
     cell = belt_cell(tmp_path)
     text = f"{START} MOVE ARM_1 TO part WITH TRACKING = belt ; PAUSE 1 ; MOVE ARM_1 TO ARM_1 * XYZ(0, 0, -20) ; END."
-    machine = Machine(code_of(text, cell), cell, Simulator(cell))
-    while not machine.state.following:
-        advance(machine, next_process(machine))
-    copied = machine.copy()
-    for one in (machine, copied):
-        while not one.state.has_ended:
-            advance(one, next_process(one))
-
-    assert np.array_equal(machine.recording().streams[0].q, copied.recording().streams[0].q)
+    check_going_back(text, cell, lambda machine: bool(machine.state.following))
 
 
 def test_names_and_variables(tmp_path: Path) -> None:
