@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.export.refusals import ExportError, refusal
+from armwright.export.refusals import ExportError
 from armwright.export.translation.code import (
     Assign,
     Call,
@@ -30,7 +30,6 @@ from armwright.export.translation.code import (
     Print,
     ProgramCode,
     Return,
-    Signal,
     Statement,
     Switch,
     Truth,
@@ -53,15 +52,14 @@ from armwright.export.writers.fanuc import (
     tool_lines,
     wait_text,
 )
+from armwright.export.writers.fanuc_text import FIRST_REGISTER, FanucText
 from armwright.export.writers.known_values import KnownValues
 from armwright.export.writers.program_text import (
     MILLIMETRES,
     Names,
-    ValueText,
     chunks_of_text,
     is_whole,
     number_of,
-    number_text,
     program_approximations,
     program_heading,
     scaled,
@@ -71,16 +69,9 @@ from armwright.export.writers.text import identifier, plain_lines
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.branch_selection import nearest_configurations
-from armwright.program.language.source import Span
 from armwright.program.language.units import NORMAL_SPEED
 from armwright.spatial.rotations import angle_between
 
-# The first of the registers and flags that the variables are, and the last.
-_FIRST, _LAST = 101, 200
-# Characters of the name of a register.
-_COMMENT_LIMIT = 16
-_ARITHMETIC = ("+", "-", "*", "/", "<", "<=", "=", "<>", ">=", ">", "and", "or")
-_CONTRARY = {"<": ">=", "<=": ">", "=": "<>", "<>": "=", ">=": "<", ">": "<="}
 # Loops that are written out have no more passes.
 _MOST_PASSES = 200
 # A way of the tool that is none [m, rad], and joint positions that are the same [rad].
@@ -107,104 +98,6 @@ def write(code: ProgramCode) -> ControllerFile:
     return _Writer(code, eager=True).file()
 
 
-class _Text(ValueText):
-    """Values in the language of the pendant.
-
-    Attributes:
-        known: what the variables hold where the value stands.
-        span: the statement there.
-    """
-
-    words = {"and": "AND", "or": "OR", "not": "!"}  # noqa: RUF012 - read alone
-
-    def __init__(self, code: ProgramCode) -> None:
-        super().__init__(code, Names(_COMMENT_LIMIT, ()))
-        self.known, self.span = KnownValues.at_start(code), Span(0, 0)
-        self._registers: dict[tuple[str, tuple[int, ...]], str] = {}
-
-    def text(self, value: Value) -> str:
-        """Return a value, in parentheses where it is worked out."""
-        text = re.sub(r" ([-+<>=]+) ", r"\1", self._text(self.plain(value))[0])
-        return text if re.fullmatch(r"[\d.]+|ON|OFF|[A-Z]+\[[^\]]*\]", text) else f"({text})"
-
-    def condition(self, value: Value) -> str:
-        """Return a condition in parentheses, in which it may be of any kind."""
-        text = self.text(value)
-        return text if text.startswith("(") else f"({text})"
-
-    def register(self, name: str) -> str:
-        """Return a register of the writer's own."""
-        return self._register((f"{name} OWN", ()), "R")
-
-    def refuse(self, message: str, *helps: str, code: str = "E619") -> NoReturn:
-        """Refuse the statement."""
-        advice = helps or ("export the run by `--mode plan`",)
-        raise refusal(self.code.source, code, message, self.span, "it stands here", helps=advice)
-
-    def plain(self, value: Value) -> Value:
-        """Return a value of registers and signals alone, with what only the exporter can work out put in."""
-        match value:
-            case Operation("negative", (inner,)):
-                return self.plain(Operation("-", (Number(0.0), inner)))
-            case Operation("not", (inner,)):
-                return _negated(self.plain(inner))
-            case Operation(name, arguments) if name in _ARITHMETIC:
-                return self._short(name, tuple(map(self.plain, arguments)))
-            case Operation(name, _):
-                known = self.known.value(value)
-                if known is None:
-                    text = f"what {name.upper()} gives is known only while the program runs, and has no counterpart"
-                    self.refuse(text, code="E620")
-                return self.plain(known)
-            case FunctionCall(procedure=key):
-                known = self.known.value(value)
-                if known is None:
-                    self.refuse(f"a called program has no value, and that of `{key.lower()}` is known only at run time")
-                return self.plain(known)
-            case Number(value=number) if "e" in number_text(number):
-                self.refuse(f"the number {number:g} cannot be written without an exponent, which the language has not")
-        return value
-
-    def _short(self, name: str, arguments: tuple[Value, ...]) -> Value:
-        """Return an operation; what it makes of constants, where it has no others."""
-        if all(isinstance(one, Number | Truth) for one in arguments):
-            known = self.known.value(Operation(name, arguments))
-            return Operation(name, arguments) if known is None else known
-        if name in ("and", "or"):
-            decides = Truth(name == "or")
-            left = tuple(one for one in arguments if not isinstance(one, Truth))
-            return decides if decides in arguments else left[0] if len(left) == 1 else Operation(name, left)
-        return Operation(name, arguments)
-
-    def truth(self, truth: bool) -> str:  # noqa: FBT001 - a value
-        return "ON" if truth else "OFF"
-
-    def pose(self, X: Array) -> str:
-        raise AssertionError(f"a pose is no value of the language: {X}")
-
-    def variable(self, value: Variable) -> str:
-        place = self.known.place(value)
-        if place is None:
-            self.refuse("which element this is is known only while the program runs", code="E620")
-        return self._register(place, "F" if self.code.kinds[value.key] == "truth" else "R")
-
-    def _register(self, place: tuple[str, tuple[int, ...]], kind: str) -> str:
-        if place not in self._registers:
-            number = _FIRST + sum(one.startswith(f"{kind}[") for one in self._registers.values())
-            if number > _LAST:
-                self.refuse(f"the program needs more than {_LAST - _FIRST + 1} registers", code="E617")
-            name = self.names("_".join((place[0], *map(str, place[1]))))
-            self._registers[place] = f"{kind}[{number}:{name}]"
-        return self._registers[place]
-
-    def signal(self, value: Signal) -> str:
-        number = number_of(self.code, value.address, value.name, self.span, least=1)
-        return f"{'DI' if value.is_input else 'DO'}[{number}]"
-
-    def function(self, name: str, arguments: tuple[Value, ...]) -> tuple[str, int]:
-        raise AssertionError(f"{name} of {arguments} has been worked out")
-
-
 @attrs.define
 class _Body:
     """What belongs to one program of the controller while it is written."""
@@ -228,7 +121,7 @@ class _Writer:
     """A program while it is written; an eager one writes out FORs in which frames are placed that it cannot know."""
 
     def __init__(self, code: ProgramCode, *, eager: bool) -> None:
-        self._code, self._text = code, _Text(code)
+        self._code, self._text = code, FanucText(code)
         self._procedures = {one.key: one for one in code.procedures}
         self._body, self._ended = _Body(), False
         # How many FORs around a statement are tried as loops, and the lines of those that are written out.
@@ -297,7 +190,7 @@ class _Writer:
         yield from COMMON
         yield "the axis speeds of the controller at 100 % are taken to be the speed limits of the arm"
         yield "speeds are whole percents, mm/s or degrees per second from 1 on, the next smaller ones where constant"
-        yield f"registers and flags from {_FIRST} on hold the variables, and are overwritten"
+        yield f"registers and flags from {FIRST_REGISTER} on hold the variables, and are overwritten"
         yield from program_approximations(code, rounded=False)
         if any(isinstance(one, WaitUntil) and one.limit is not None for one in code.everything()):
             yield "$WAITTMOUT of the controller is overwritten, in hundredths of a second"
@@ -659,20 +552,6 @@ class _Writer:
         positions = self._body.positions
         found = next((i for i, one in enumerate(positions) if one.partition("{")[2] == joints), None)
         return position(self._code.mapped.joints(q), positions) if found is None else f"P[{found + 1}]"
-
-
-def _negated(value: Value) -> Value:
-    """Return the contrary of a condition, in which a signal or a flag alone is negated."""
-    match value:
-        case Operation("not", (inner,)):
-            return inner
-        case Operation("and" | "or" as name, arguments):
-            return Operation("or" if name == "and" else "and", tuple(map(_negated, arguments)))
-        case Operation(name, arguments):
-            return Operation(_CONTRARY[name], arguments)
-        case Truth(value=truth):
-            return Truth(not truth)
-    return Operation("not", (value,))
 
 
 def _is_natural(value: Value) -> bool:
