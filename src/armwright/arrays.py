@@ -1,5 +1,6 @@
 """Converters of arrays, which check shape and values, copy to float64 and make read-only; and the cores for them."""
 
+import math
 import operator
 import os
 import sys
@@ -118,6 +119,11 @@ def integer(value: int, what: str, *, least: int) -> int:
     if result < least:
         raise InvalidValueError(f"{what}: expected an integer of at least {least}, got {result}")
     return result
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a number as JSON holds it: None where it is infinite or NaN."""
+    return float(value) if math.isfinite(value) else None
 
 
 def evenly_spread(count: int, most: int, what: str = "most") -> Numbers:

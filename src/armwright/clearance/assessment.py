@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.clearance.contact import damping, restitution_of_damping
 from armwright.clearance.energy_balance import EnergyBalance, energy_balance
 from armwright.clearance.features import spectrum
@@ -210,17 +210,12 @@ def _pin_data(run: ClearanceRun, i: int) -> dict[str, Any]:
     forces, depths = run.simulation.forces[: run.rows, i], run.depths[: run.rows, i]
     return {
         "clearance": float(run.simulation.clearances[i]),
-        "peak_force": _finite_or_none(run.simulation.peaks[i]),
+        "peak_force": finite_or_none(run.simulation.peaks[i]),
         "mean_force": float(forces.mean()),
         "impacts": int(run.simulation.impacts[i]),
         "flight": float((depths < 0).mean()),
         "deepest": float(max(depths.max(), 0.0)),
     }
-
-
-def _finite_or_none(x: float) -> float | None:
-    """Return a number as JSON knows it: what is infinite is none."""
-    return float(x) if np.isfinite(x) else None
 
 
 def target_errors(run: ClearanceRun) -> list[dict[str, Any]]:
@@ -238,7 +233,7 @@ def target_errors(run: ClearanceRun) -> list[dict[str, Any]]:
             target["nearest"] = float(distance.min())
         if run.predictability is not None:
             target["mean_x"], target["mean_y"], target["spread_x"], target["spread_y"] = (
-                _finite_or_none(np.interp(t, run.simulation.time, values[:, i]))
+                finite_or_none(np.interp(t, run.simulation.time, values[:, i]))
                 for values in (run.predictability.mean, run.predictability.spread)
                 for i in range(2)
             )

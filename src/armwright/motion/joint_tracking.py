@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.errors import InvalidValueError, TooFewError
 from armwright.files.logs.joint_log import JointStates
 from armwright.files.result_table import ResultTable
@@ -104,9 +104,9 @@ class JointTracking:
                 "at": float(self.t[np.abs(self.error[:, i]).argmax()]),
                 "rms_error": _rms(self.error[:, i]),
                 "mean_error": float(self.error[:, i].mean()),
-                "delay": _known(self.delay[i]),
-                "delay_deviation": _known(self.delay_deviation[i]),
-                "rms_without_delay": _known(self.left[i]),
+                "delay": finite_or_none(self.delay[i]),
+                "delay_deviation": finite_or_none(self.delay_deviation[i]),
+                "rms_without_delay": finite_or_none(self.left[i]),
             }
             for i, name in enumerate(self.names)
         ]
@@ -115,7 +115,7 @@ class JointTracking:
         return {
             **ends,
             "offset": self.offset,
-            "delay": _known(self.common_delay),
+            "delay": finite_or_none(self.common_delay),
             "largest_tool_error": tool,
             "joints": joints,
         }
@@ -332,7 +332,3 @@ def _best_shift(plan: JointStates, seen: JointStates) -> float:
 
 def _rms(values: Array) -> float:
     return math.sqrt(float((values**2).mean()))
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

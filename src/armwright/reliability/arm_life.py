@@ -10,7 +10,17 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, joint_array, not_negative, positive, read_only
+from armwright.arrays import (
+    Array,
+    ArrayLike,
+    Numbers,
+    evenly_spread,
+    finite_or_none,
+    joint_array,
+    not_negative,
+    positive,
+    read_only,
+)
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.jacobians import jacobian
@@ -196,15 +206,15 @@ class ArmLife:
         return {
             "arm": self.arm.name,
             "cycle_s": self.cycle,
-            "hours": _finite(self.hours),
-            "cycles": _finite(self.cycles_of(self.hours)),
+            "hours": finite_or_none(self.hours),
+            "cycles": finite_or_none(self.cycles_of(self.hours)),
             "weibull_slope": self.slope,
             "components": [
                 {
                     "joint": one.joint + 1,
                     "name": one.name,
-                    "hours": _finite(one.hours),
-                    "cycles": _finite(self.cycles_of(one.hours)),
+                    "hours": finite_or_none(one.hours),
+                    "cycles": finite_or_none(self.cycles_of(one.hours)),
                     "load": one.load._asdict(),
                     "exceeds": list(one.exceeded),
                     "source": one.rating.source,
@@ -216,7 +226,7 @@ class ArmLife:
             "play": None
             if play is None
             else {
-                "cycles": {f"{part:g}": _finite(play.quantile(part)) for part in QUANTILES},
+                "cycles": {f"{part:g}": finite_or_none(play.quantile(part)) for part in QUANTILES},
                 "pose": int(self.numbers[play.pose]),
                 "shares": play.shares.tolist(),
                 "new_repeatability_m": float(play.repeatability.max()),
@@ -456,7 +466,3 @@ def _curve(life: ArmLife, play: PlayLife, first: Array, rates: Array) -> tuple[A
 
 def _count(value: float) -> str:
     return f"{value:.3g}" if np.isfinite(value) else "endless"
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, integer, joint_array, positive
+from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, finite_or_none, integer, joint_array, positive
 from armwright.errors import InvalidValueError, TooFewError
 from armwright.files.result_table import ResultTable
 from armwright.reliability.allocation import Allocation, Rule, allocate, error_bounds
@@ -124,7 +124,7 @@ class ToleranceAssessment:
                     "unit": "m" if self.tolerances[i].is_length else "rad",
                     "half_width": self.tolerances[i].half_width,
                     "share": float(self.error.shares[self.worst_pose, i]),
-                    "allocated": _finite(allocation.half_widths[i]) if allocation else None,
+                    "allocated": finite_or_none(allocation.half_widths[i]) if allocation else None,
                     "allocated_cost": float(allocation.costs[i]) if allocation else None,
                 }
                 for i in self.ranking
@@ -292,7 +292,3 @@ def _nonlinearity(error: LinearError, deviations: Array, sampled: Array) -> floa
 
 def _mm(metres: float) -> str:
     return f"{metres * 1e3:.4f}"
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

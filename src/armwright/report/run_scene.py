@@ -104,7 +104,7 @@ def _in_world(recording: Recording, track: PartTrack) -> PartTrack:
             entries.append((begin, carrier, X))
             continue
         frame = frames[carrier]
-        starts = frame.joints[: len(frame.joints) // 2]
+        starts = np.array([time for time, _ in frame.changes])
         ramps = (starts[:, None] + np.linspace(0.0, frame.ramp, _RAMP_POSES)).ravel()
         moments = np.unique([begin, *ramps[(ramps > begin) & (ramps < end)], end])
         entries += [(time, None, frame.pose_at(time) @ X) for time in moments.tolist()]

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, finite_or_none
 from armwright.errors import counted
 from armwright.files.result_table import ResultTable
 from armwright.program.vm.trials import SEPARATOR
@@ -174,9 +174,9 @@ class TrialsSummary:
                     "trial": it.number,
                     "cause": it.cause or None,
                     "ended": it.ended,
-                    "error_mm": _known(it.distance * 1e3),
-                    "error_deg": _known(math.degrees(it.angle)),
-                    "duration_s": _known(it.duration),
+                    "error_mm": finite_or_none(it.distance * 1e3),
+                    "error_deg": finite_or_none(math.degrees(it.angle)),
+                    "duration_s": finite_or_none(it.duration),
                 }
                 for it in self.trials
             ],
@@ -215,11 +215,6 @@ def _spread(values: Array) -> dict[str, float | None]:
         return {"median": None, "p95": None, "largest": None}
     middle, most = _quantiles(values)
     return {"median": middle, "p95": most, "largest": float(values.max())}
-
-
-def _known(value: float) -> float | None:
-    """Return a number that JSON can hold; None where nothing is known."""
-    return value if math.isfinite(value) else None
 
 
 def _listed(numbers: tuple[int, ...]) -> str:
