@@ -1,6 +1,7 @@
 from .correction import Correction as Correction, correct_nodes as correct_nodes, correct_path as correct_path
 from .estimation.static_estimate import Estimate as Estimate, estimate_at_rest as estimate_at_rest
 from .linkage import Linkage as Linkage
+from .natural_modes import NaturalModes as NaturalModes, natural_modes as natural_modes
 from .paths import named_path as named_path, thesis_path as thesis_path
 from .reader import linkage_names as linkage_names, load_linkage as load_linkage
 from .scenario import Scenario as Scenario, prepare_scenario as prepare_scenario

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.equations import kinetic_energy, potential_energy
+from armwright.clearance.equations import kinetic_energy, potential_energy, strain_energy
 from armwright.clearance.placement import Placement
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.simulation import Simulation
@@ -23,6 +23,8 @@ class EnergyBalance:
         stored: (..., s) in the walls of the bearings [J].
         impact_loss: (..., s) lost in impacts [J].
         friction_loss: (..., s) lost in friction [J].
+        strain: (..., s) with which elastic rods are bent and stretched [J].
+        damping_loss: (..., s) lost in their damping [J].
     """
 
     driven: Array
@@ -31,12 +33,15 @@ class EnergyBalance:
     stored: Array
     impact_loss: Array
     friction_loss: Array
+    strain: Array
+    damping_loss: Array
 
     @property
     def imbalance(self) -> Array:
         """(..., s) the residual of the balance: the error of the integration [J]."""
-        energy = self.kinetic + self.potential + self.stored
-        return np.asarray(energy - energy[..., :1] - self.driven + self.impact_loss + self.friction_loss)
+        energy = self.kinetic + self.potential + self.stored + self.strain
+        losses = self.impact_loss + self.friction_loss + self.damping_loss
+        return np.asarray(energy - energy[..., :1] - self.driven + losses)
 
 
 def energy_balance(simulation: Simulation) -> EnergyBalance:
@@ -54,4 +59,6 @@ def energy_balance(simulation: Simulation) -> EnergyBalance:
         stored=np.asarray((0.4 * K[..., None, :] * depths**2.5).sum(axis=-1)),
         impact_loss=simulation.works["impact loss"],
         friction_loss=simulation.works["friction loss"],
+        strain=np.broadcast_to(strain_energy(placement), potential.shape),
+        damping_loss=simulation.works.get("damping loss", np.zeros_like(potential)),
     )

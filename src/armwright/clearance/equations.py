@@ -7,7 +7,7 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
@@ -21,7 +21,7 @@ from armwright.clearance.contact import (
     normal_force,
     smooth_slip,
 )
-from armwright.clearance.linkage import GROUND, ClearancePin, Coordinate, Linkage
+from armwright.clearance.linkage import ClearancePin, Linkage, Pin
 from armwright.clearance.placement import Placement, Vec2
 from armwright.tracing.scalar import Scalar, select, sqrt
 
@@ -30,6 +30,8 @@ SlipSpeed: TypeAlias = Literal["surface", "centre"]
 SLIP_SPEEDS: tuple[SlipSpeed, ...] = ("surface", "centre")
 # Works that are integrated along with the motion [J].
 WORKS = ("driven", "impact loss", "friction loss")
+# One more of linkages with elastic rods.
+ROD_WORKS = ("damping loss",)
 # A journal nearer to the middle of its bearing has no direction [m].
 _TINY = 1e-12
 # Time constant with which bristles without a force straighten [s].
@@ -128,9 +130,9 @@ class Rates(NamedTuple):
     Attributes:
         qdd: accelerations of its coordinates.
         efforts: of its drives [N m, N].
-        powers: of ``WORKS`` [W].
+        powers: of ``WORKS``, and of ``ROD_WORKS`` where there are rods [W].
         pins: the contact in each.
-        energy: kinetic energy, that of gravity and loads, and that in the contacts [J].
+        energy: kinetic energy, that of gravity and loads, and that in the contacts and rods [J].
     """
 
     qdd: list[Scalar]
@@ -163,32 +165,37 @@ def rates(
         impact_loss = impact_loss + pin.losses[0]
         friction_loss = friction_loss + pin.losses[1]
         stored = stored + pin.stored
-    qdd, efforts = _accelerations(linkage, mass_matrix(placement), force, drives)
+    qdd, efforts = _accelerations(placement, mass_matrix(placement), force, drives)
     driven = 0.0
     for drive, effort in zip(linkage.drives, efforts, strict=True):
-        for i, weight in drive_weights(linkage, drive.body).items():
+        for i, weight in drive_weights(placement, drive.body).items():
             driven = driven + effort * weight * state.qd[i]
-    energy = [kinetic_energy(placement), potential_energy(placement), stored]
-    return Rates(qdd, efforts, [driven, impact_loss, friction_loss], pins, energy)
+    powers = [driven, impact_loss, friction_loss]
+    if placement.rods:
+        powers.append(sum((c * state.qd[i] * state.qd[i] for i, _, c in rod_springs(placement)), 0.0))
+    energy = [kinetic_energy(placement), potential_energy(placement), stored + strain_energy(placement)]
+    return Rates(qdd, efforts, powers, pins, energy)
 
 
 # ---- bodies --------------------------------------------------------------------------------------------------------
 
 
 def free_forces(placement: Placement) -> list[Scalar]:
-    """Return the generalised forces of gravity, loads and speeds, without drives and contacts."""
+    """Return the generalised forces of gravity, loads, speeds and rods, without drives and contacts."""
     linkage = placement.linkage
-    force: list[Scalar] = [0.0] * len(linkage.coordinates)
+    force: list[Scalar] = [0.0] * len(placement.q)
     gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
-        centre = placement.centre(body)
-        push = gravity.minus(centre.bias).times(body.mass)
-        for i, partial in centre.partials.items():
-            force[i] += partial.dot(push)
+        for mass, point in placement.masses(body):
+            push = gravity.minus(point.bias).times(mass)
+            for i, partial in point.partials.items():
+                force[i] += partial.dot(push)
     for load in linkage.loads:
         push = Vec2(*map(float, load.force))
         for i, partial in placement.point(load.point).partials.items():
             force[i] += partial.dot(push)
+    for i, k, c in rod_springs(placement):
+        force[i] = force[i] - k * placement.q[i] - c * placement.qd[i]
     return force
 
 
@@ -196,15 +203,16 @@ def mass_matrix(placement: Placement) -> dict[tuple[int, int], Scalar]:
     """Return the entries on and below the diagonal of the mass matrix, but for those that are always 0."""
     entries: dict[tuple[int, int], Scalar] = {}
     for body in placement.linkage.bodies:
-        partials, rotations = placement.centre(body).partials, placement.frames[body.name].angle_partials
-        for i, partial in partials.items():
-            for j, other in partials.items():
-                if i >= j:
-                    entries[i, j] = entries.get((i, j), 0.0) + body.mass * partial.dot(other)
+        inertia, rotations = placement.inertia(body), placement.frames[body.name].angle_partials
+        for mass, point in placement.masses(body):
+            for i, partial in point.partials.items():
+                for j, other in point.partials.items():
+                    if i >= j:
+                        entries[i, j] = entries.get((i, j), 0.0) + mass * partial.dot(other)
         for i, weight in rotations.items():
             for j, other_weight in rotations.items():
                 if i >= j:
-                    entries[i, j] = entries.get((i, j), 0.0) + body.inertia * weight * other_weight
+                    entries[i, j] = entries.get((i, j), 0.0) + inertia * weight * other_weight
     return {index: entry for index, entry in entries.items() if not (isinstance(entry, float) and entry == 0)}
 
 
@@ -212,8 +220,10 @@ def kinetic_energy(placement: Placement) -> Scalar:
     """Return the kinetic energy of all bodies [J]."""
     energy = 0.0
     for body in placement.linkage.bodies:
-        velocity, spin = placement.centre(body).velocity, placement.frames[body.name].spin
-        energy = energy + 0.5 * body.mass * velocity.dot(velocity) + 0.5 * body.inertia * spin * spin
+        spin = placement.frames[body.name].spin
+        for mass, point in placement.masses(body):
+            energy = energy + 0.5 * mass * point.velocity.dot(point.velocity)
+        energy = energy + 0.5 * placement.inertia(body) * spin * spin
     return energy
 
 
@@ -222,33 +232,46 @@ def potential_energy(placement: Placement) -> Scalar:
     linkage, energy = placement.linkage, 0.0
     gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
-        energy = energy - body.mass * gravity.dot(placement.centre(body).position)
+        for mass, point in placement.masses(body):
+            energy = energy - mass * gravity.dot(point.position)
     for load in linkage.loads:
         energy = energy - Vec2(*map(float, load.force)).dot(placement.point(load.point).position)
     return energy
 
 
-def drive_weights(linkage: Linkage, body: str) -> dict[int, float]:
-    """Return the weights of a drive's effort on the coordinates, also on that of the body that carries it."""
-    coordinates = linkage.coordinates
-    weights = {next(i for i, coordinate in enumerate(coordinates) if coordinate.body == body): 1.0}
-    carrier_angle = Coordinate(linkage.rotation_carrier(body) or GROUND, "angle")
-    if carrier_angle in coordinates:
-        weights[coordinates.index(carrier_angle)] = -1.0
+def rod_springs(placement: Placement) -> Iterator[tuple[int, float, float]]:
+    """Give the number of each coordinate of a rod, its stiffness [N/m] and its damping [N s/m]."""
+    for rod in placement.rods.values():
+        yield from zip(rod.numbers, rod.rod.stiffness, rod.rod.damping, strict=True)
+
+
+def strain_energy(placement: Placement) -> Scalar:
+    """Return the energy with which rods are bent and stretched [J]."""
+    return sum((0.5 * k * placement.q[i] * placement.q[i] for i, k, _ in rod_springs(placement)), 0.0)
+
+
+def drive_weights(placement: Placement, body: str) -> dict[int, float]:
+    """Return the weights of a drive's effort on the coordinates, also on those of the body that carries it."""
+    linkage = placement.linkage
+    joint = linkage.joint(body)
+    weights = {next(i for i, coordinate in enumerate(linkage.coordinates) if coordinate.body == body): 1.0}
+    if isinstance(joint, Pin):
+        weights |= {i: -weight for i, weight in placement.section(joint.on).angle_partials.items()}
     return weights
 
 
 def _accelerations(
-    linkage: Linkage, M: Mapping[tuple[int, int], Scalar], force: list[Scalar], drives: Sequence[Scalar]
+    placement: Placement, M: Mapping[tuple[int, int], Scalar], force: list[Scalar], drives: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
     """Return the accelerations of the coordinates and the efforts of the drives."""
+    linkage = placement.linkage
     prescribed: dict[int, Scalar] = {}
     efforts: list[Scalar] = []
     for drive, number, value in zip(linkage.drives, linkage.driven, drives, strict=True):
         if drive.kind == "motion":
             prescribed[number] = value
         else:
-            for i, weight in drive_weights(linkage, drive.body).items():
+            for i, weight in drive_weights(placement, drive.body).items():
                 force[i] = force[i] + weight * value
         efforts.append(value)
     free = [i for i in range(len(force)) if i not in prescribed]
@@ -264,7 +287,7 @@ def _accelerations(
     for number in sorted(moving, reverse=True):
         row = [_entry(M, number, j) * qdd[j] for j in range(len(qdd)) if (max(number, j), min(number, j)) in M]
         efforts[moving[number]] = effort = sum(row) - force[number]
-        for i, weight in drive_weights(linkage, linkage.drives[moving[number]].body).items():
+        for i, weight in drive_weights(placement, linkage.drives[moving[number]].body).items():
             if i != number:
                 force[i] = force[i] + weight * effort
     return qdd, efforts
@@ -314,7 +337,7 @@ def _pin_contact(
     The forces on both bodies act at one point, on the wall of the bearing, so that no net couple remains.
     """
     bearing, journal = placement.point(pin.bearing), placement.point(pin.journal)
-    hole, shaft = placement.frames[pin.bearing.body], placement.frames[pin.journal.body]
+    hole, shaft = placement.section(pin.bearing), placement.section(pin.journal)
     gap = journal.position.minus(bearing.position)
     distance = sqrt(gap.dot(gap))
     outward = gap.times(1.0 / select(distance > _TINY, distance, _TINY))

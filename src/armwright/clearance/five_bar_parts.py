@@ -103,7 +103,7 @@ def five_bar_coordinates(linkage: Linkage, angles: ArrayLike) -> Array:
             values |= {(link.body, "x"): centre[..., 0], (link.body, "y"): centre[..., 1]}
             values[link.body, "angle"] = axis - linkage.zero
             start = start + _rotate(link.end - link.start, axis)
-    return np.stack([values[coordinate] for coordinate in linkage.coordinates], axis=-1)
+    return np.stack([values[coordinate] for coordinate in linkage.rigid_coordinates], axis=-1)
 
 
 def _rotate(point: Array, angle: Array) -> Array:

@@ -1,7 +1,8 @@
 """The linkage without clearance: its motion on a path, the efforts of its drives, and the reactions in its pins.
 
 All pins are closed. Positions follow from Newton's iteration on the closure of the loops, speeds and accelerations from
-its derivatives, efforts and reactions from the balance of every body; all for many samples at once.
+its derivatives, efforts and reactions from the balance of every body; all for many samples at once. Elastic rods are
+straight and rigid here, and their coordinates are left out.
 """
 
 from __future__ import annotations
@@ -73,7 +74,7 @@ def close_pins(
     goal = _goal_array(linkage, tip=tip, drives=drives)
     start = floats(guess, "guess")
     lead = np.broadcast_shapes(start.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
-    n, p = len(linkage.coordinates), len(linkage.pins)
+    n, p = len(linkage.rigid_coordinates), len(linkage.pins)
     q = np.array(np.broadcast_to(start, (*lead, n))).reshape(-1, n)
     goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), goal.shape[-1])
     apart = np.broadcast_to(gaps, (*lead, p, 2)).reshape(len(q), 2 * p)
@@ -92,11 +93,11 @@ def _close_loops(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_ti
     """Close the loops of configurations (s, n) in place; return the index of the worst, if any stays open."""
     done = np.zeros((len(q), 1), dtype=bool)
     for _ in range(_MAX_ITERATIONS):
-        placement = _place_bodies(linkage, q)
+        placement = place_bodies(linkage, q)
         residuals = _residuals(placement, goal, by_tip=by_tip)
         residuals[..., : apart.shape[-1]] -= apart
         with np.errstate(invalid="ignore"):
-            step = _solve(_closure(placement, by_tip), -residuals)
+            step = solve(closure(placement, by_tip), -residuals)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
         step *= np.minimum(1.0, _MAX_STEP / np.maximum(size, 1e-300))
         q += np.where(done, 0.0, step)
@@ -139,12 +140,12 @@ def _block_motion(
     """Return the parts of ``IdealMotion`` for configurations (s, n)."""
     lead = q.shape[:-1]
     still = [np.zeros((*lead, 2 * len(linkage.pins)))]
-    A = _closure(_place_bodies(linkage, q), by_tip)
-    qd = _solve(A, np.concatenate([*still, speeds], axis=-1))
-    moving = _place_bodies(linkage, q, qd)
+    A = closure(place_bodies(linkage, q), by_tip)
+    qd = solve(A, np.concatenate([*still, speeds], axis=-1))
+    moving = place_bodies(linkage, q, qd)
     points = [_gap(moving, i) for i in range(len(linkage.pins))] + ([moving.point(linkage.tip)] if by_tip else [])
     biases = [x for point in points for x in point.bias] + [0.0] * (0 if by_tip else len(linkage.drives))
-    qdd = _solve(A, np.concatenate([*still, accelerations], axis=-1) - _stack(lead, biases))
+    qdd = solve(A, np.concatenate([*still, accelerations], axis=-1) - stack(lead, biases))
     efforts, reactions = inverse_dynamics(linkage, q, qd, qdd)
     return q, qd, qdd, efforts, reactions
 
@@ -164,28 +165,35 @@ def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple
     Raises:
         InvalidValueError: the freedoms are not as many as the drives, or the configuration is singular.
     """
-    n, p, d = len(linkage.coordinates), len(linkage.pins), len(linkage.drives)
+    n, p, d = len(linkage.rigid_coordinates), len(linkage.pins), len(linkage.drives)
     if n != d + 2 * p:
         raise InvalidValueError(
             f"{linkage.name}: expected one drive for each freedom, got {d} drives for {n - 2 * p} freedoms"
         )
     lead = q.shape[:-1]
-    moving = _place_bodies(linkage, q, qd)
-    need = -_stack(lead, free_forces(moving))
+    moving = place_bodies(linkage, q, qd)
+    need = -stack(lead, free_forces(moving))
     for (i, j), entry in mass_matrix(moving).items():
         need[..., i] += entry * qdd[..., j]
         if i != j:
             need[..., j] += entry * qdd[..., i]
-    A = np.zeros((*lead, n, n))
+    solution = solve(effects(moving), need)
+    return solution[..., :d], solution[..., d:].reshape(*lead, p, 2)
+
+
+def effects(placement: Placement) -> Array:
+    """Return (..., n, d + 2 p) the generalised forces of unit efforts, and of unit forces on the bearings."""
+    linkage = placement.linkage
+    d, p = len(linkage.drives), len(linkage.pins)
+    A = np.zeros((*np.shape(placement.q[0]), len(placement.q), d + 2 * p))
     for k, drive in enumerate(linkage.drives):
-        for i, weight in drive_weights(linkage, drive.body).items():
+        for i, weight in drive_weights(placement, drive.body).items():
             A[..., i, k] = weight
     for k in range(p):
-        for i, partial in _gap(moving, k).partials.items():
+        for i, partial in _gap(placement, k).partials.items():
             A[..., i, d + 2 * k] = -partial.x
             A[..., i, d + 2 * k + 1] = -partial.y
-    solution = _solve(A, need)
-    return solution[..., :d], solution[..., d:].reshape(*lead, p, 2)
+    return A
 
 
 def tip_position(linkage: Linkage, q: Array) -> Array:
@@ -195,14 +203,14 @@ def tip_position(linkage: Linkage, q: Array) -> Array:
 
 def point_position(linkage: Linkage, point: BodyPoint, q: Array) -> Array:
     """Return (..., 2) the position of a point of a body [m] at coordinates (..., n)."""
-    return _stack(q.shape[:-1], _place_bodies(linkage, q).point(point).position)
+    return stack(q.shape[:-1], place_bodies(linkage, q).point(point).position)
 
 
 def pin_gaps(linkage: Linkage, q: Array) -> Array:
     """Return (..., p, 2) from the centre of each bearing to that of its journal [m] at coordinates (..., n)."""
-    placement, p = _place_bodies(linkage, q), len(linkage.pins)
+    placement, p = place_bodies(linkage, q), len(linkage.pins)
     gaps = [x for i in range(p) for x in _gap(placement, i).position]
-    return _stack(q.shape[:-1], gaps).reshape(*q.shape[:-1], p, 2)
+    return stack(q.shape[:-1], gaps).reshape(*q.shape[:-1], p, 2)
 
 
 def tip_sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
@@ -223,9 +231,9 @@ def tip_sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
     """
     q = floats(q, "q")
     lead, p = q.shape[:-1], len(linkage.pins)
-    placement = _place_bodies(linkage, q)
-    A = _closure(placement, by_tip=False)
-    inverse = _solve_columns(A, np.eye(q.shape[-1])[:, : 2 * p])
+    placement = place_bodies(linkage, q)
+    A = closure(placement, by_tip=False)
+    inverse = solve_columns(A, np.eye(q.shape[-1])[:, : 2 * p])
     tip = _jacobian(lead, [placement.point(linkage.tip)], q.shape[-1])
     return (tip @ inverse).reshape(*lead, 2, p, 2)
 
@@ -238,7 +246,7 @@ def _blocks(count: int) -> list[slice]:
     return [slice(start, min(start + _BLOCK, count)) for start in range(0, max(count, 1), _BLOCK)]
 
 
-def _place_bodies(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
+def place_bodies(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
     """Return the bodies in many configurations at once, at rest without speeds."""
     speeds = [0.0] * q.shape[-1] if qd is None else list(np.moveaxis(qd, -1, 0))
     return Placement(linkage, list(np.moveaxis(q, -1, 0)), speeds)
@@ -274,12 +282,12 @@ def _residuals(placement: Placement, goal: Array, *, by_tip: bool) -> Array:
     reached = placement.point(linkage.tip).position if by_tip else [placement.q[i] for i in linkage.driven]
     residuals = [x for i in range(len(linkage.pins)) for x in _gap(placement, i).position]
     residuals += [x - goal[..., i] for i, x in enumerate(reached)]
-    return _stack(np.shape(placement.q[0]), residuals)
+    return stack(np.shape(placement.q[0]), residuals)
 
 
-def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of two kinds of equations
+def closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of two kinds of equations
     """Return the partial derivatives of gaps and tip, or of gaps and driven coordinates."""
-    linkage, n = placement.linkage, len(placement.linkage.coordinates)
+    linkage, n = placement.linkage, len(placement.q)
     lead = np.shape(placement.q[0])
     rows = [_jacobian(lead, [_gap(placement, i) for i in range(len(linkage.pins))], n)]
     if by_tip:
@@ -287,8 +295,8 @@ def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of 
     else:
         rows.append(np.broadcast_to(np.eye(n)[list(linkage.driven)], (*lead, len(linkage.drives), n)))
     A = np.concatenate(rows, axis=-2)
-    if A.shape[-2] != n:
-        freedoms = n - 2 * len(linkage.pins)
+    if A.shape[-2] != len(linkage.rigid_coordinates):
+        freedoms = len(linkage.rigid_coordinates) - 2 * len(linkage.pins)
         what = "a position of the tip fixes 2" if by_tip else f"its drives fix {len(linkage.drives)}"
         raise InvalidValueError(
             f"{linkage.name}: with its pins closed it has {counted(freedoms, 'freedom')}, and {what}; expected as many"
@@ -304,7 +312,7 @@ def _jacobian(lead: tuple[int, ...], points: Sequence[Point], n: int) -> Array:
     return J
 
 
-def _stack(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
+def stack(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
     """Return numbers and arrays, broadcast to the leading axes, along a last axis."""
     stacked = np.zeros((*lead, len(numbers)))
     for i, x in enumerate(numbers):
@@ -312,12 +320,12 @@ def _stack(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
     return stacked
 
 
-def _solve(A: Array, right: Array) -> Array:
-    """Return A⁻¹ b of many systems; errors as of ``_solve_columns``."""
-    return np.asarray(_solve_columns(A, right[..., None])[..., 0], dtype=np.float64)
+def solve(A: Array, right: Array) -> Array:
+    """Return A⁻¹ b of many systems; errors as of ``solve_columns``."""
+    return np.asarray(solve_columns(A, right[..., None])[..., 0], dtype=np.float64)
 
 
-def _solve_columns(A: Array, columns: Array) -> Array:
+def solve_columns(A: Array, columns: Array) -> Array:
     """Return A⁻¹ B of many systems.
 
     Raises:

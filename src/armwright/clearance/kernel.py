@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import attrs
 
 from armwright.clearance import event_location, simulation_loop
-from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
+from armwright.clearance.equations import ROD_WORKS, WORKS, Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.lane_layout import LANES
 from armwright.clearance.linkage import Linkage, Material
 from armwright.tracing.emit import emit_lanes
@@ -80,9 +80,14 @@ class Layout:
         return self.pins if self.friction.law == "lugre" else 0
 
     @property
+    def works(self) -> tuple[str, ...]:
+        """The names of the works that are integrated along with the motion."""
+        return (*WORKS, *ROD_WORKS) if self.linkage.rods else WORKS
+
+    @property
     def states(self) -> int:
         """The number of coordinates, speeds, bristle deflections and works."""
-        return 2 * self.n + self.deflections + len(WORKS)
+        return 2 * self.n + self.deflections + len(self.works)
 
     @property
     def columns(self) -> int:
@@ -108,7 +113,7 @@ class Layout:
 
         q, qd = take(self.n), take(self.n)
         deflections = take(self.deflections) or [0.0] * self.pins
-        take(len(WORKS))
+        take(len(self.works))
         impacts = [(take(1)[0], take(1)[0]) for _ in range(self.pins)]
         contacts = [Contact(*take(len(Contact._fields))) for _ in range(self.pins)]
         gains, columns = take(self.gains), take(self.columns)

@@ -16,7 +16,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, not_negative, number, of_shape, positive
-from armwright.errors import InvalidValueError, UnknownNameError, one_of
+from armwright.clearance.elastic_rod import Elasticity, Rod, RodBody, rod_of_body
+from armwright.errors import ArmwrightError, InvalidValueError, UnknownNameError, one_of
 
 # The name of the fixed body.
 GROUND = "ground"
@@ -24,7 +25,6 @@ GROUND = "ground"
 GRAVITY = (0.0, -9.81)
 
 DriveKind: TypeAlias = Literal["effort", "motion"]
-CoordinateKind: TypeAlias = Literal["angle", "slide", "x", "y"]
 
 
 def _vector2(value: ArrayLike) -> Array:
@@ -52,7 +52,7 @@ class BodyPoint(NamedTuple):
 
 @attrs.frozen(kw_only=True, eq=False)
 class Body:
-    """A rigid body.
+    """A rigid body, or an elastic one.
 
     Attributes:
         name: of the body.
@@ -60,6 +60,7 @@ class Body:
         inertia: about its centre of mass [kg m²].
         centre: (2,) centre of mass, along the axis of the body and across it [m].
         points: (2,) points of it by name, in the same axes [m].
+        elastic: what bends and stretches; None for a rigid body.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Body:
     inertia: float = 0.0
     centre: Array = attrs.field(converter=_vector2, default=(0.0, 0.0))
     points: Mapping[str, Array] = attrs.field(converter=_points, factory=dict)
+    elastic: Elasticity | None = None
 
     def __attrs_post_init__(self) -> None:
         """Check mass and inertia."""
@@ -185,10 +187,13 @@ class Material:
 
 
 class Coordinate(NamedTuple):
-    """One number of a configuration: an ``angle``, a ``slide`` along a guide, or ``x`` and ``y`` of a centre."""
+    """One number of a configuration.
+
+    It is an ``angle``, a ``slide`` along a guide, ``x`` or ``y`` of a centre, or one of ``Elasticity.kinds``.
+    """
 
     body: str
-    kind: CoordinateKind
+    kind: str
 
     def __str__(self) -> str:
         """Return the name under which it is shown."""
@@ -196,7 +201,7 @@ class Coordinate(NamedTuple):
 
 
 # The coordinates of a body by its ideal joint.
-_JOINT_COORDINATES: Mapping[type, tuple[CoordinateKind, ...]] = {
+_JOINT_COORDINATES: Mapping[type, tuple[str, ...]] = {
     Pin: ("angle",),
     Guide: ("slide",),
     type(None): ("x", "y", "angle"),
@@ -270,6 +275,7 @@ class Linkage:
             self._check_prescribed(drive)
         for name in self.assembly:
             one_of("body", name, names[1:])
+        self._check_rods()
 
     def joint(self, body: str) -> Pin | Guide | None:
         """Return the ideal joint that carries a body; None for a free one."""
@@ -296,8 +302,32 @@ class Linkage:
         return points[point.point]
 
     @property
+    def rods(self) -> dict[str, Rod]:
+        """The elastic bodies.
+
+        Raises:
+            InvalidValueError: a body cannot be the elastic rod that it is said to be.
+        """
+        driven, rods = [drive.body for drive in self.drives], {}
+        for body in self.bodies:
+            if body.elastic is not None:
+                joint, numbers = self.joint(body.name), RodBody(body.mass, body.inertia, *body.centre.tolist())
+                held = None if joint is None else joint.point
+                try:
+                    rods[body.name] = rod_of_body(body.elastic, numbers, body.points, held, clamped=body.name in driven)
+                except ArmwrightError as error:
+                    raise InvalidValueError(f"elastic body {body.name}: {error}") from error
+        return rods
+
+    @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """The coordinates of a configuration, in order."""
+        """The coordinates of a configuration, in order: those of the bodies as rigid ones, then those of the rods."""
+        elastic = [Coordinate(body.name, kind) for body in self.bodies if body.elastic for kind in body.elastic.kinds]
+        return (*self.rigid_coordinates, *elastic)
+
+    @property
+    def rigid_coordinates(self) -> tuple[Coordinate, ...]:
+        """The coordinates of a configuration whose rods are straight."""
         bodies = [(body.name, _JOINT_COORDINATES[type(self.joint(body.name))]) for body in self.bodies]
         return tuple(Coordinate(body, kind) for body, kinds in bodies for kind in kinds)
 
@@ -337,6 +367,9 @@ class Linkage:
     def as_data(self) -> dict[str, Any]:
         """Return the linkage as JSON holds it."""
         data: dict[str, Any] = json.loads(json.dumps(attrs.asdict(self), default=np.ndarray.tolist))
+        for body in (data["ground"], *data["bodies"]):
+            if body["elastic"] is None:
+                del body["elastic"]
         return data
 
     def rotation_carrier(self, body: str) -> str | None:
@@ -360,6 +393,20 @@ class Linkage:
             raise InvalidValueError(
                 f"drive of {drive.body}: its motion can be given only if that of {carrier} is, which carries it"
             )
+
+    def _check_rods(self) -> None:
+        """Refuse elastic bodies that are no beams, and guides and prescribed motions on them."""
+        rods = self.rods
+        for joint in self.joints:
+            if isinstance(joint, Guide) and {joint.body, joint.on.body} & rods.keys():
+                raise InvalidValueError(
+                    f"guide of {joint.body}: expected rigid bodies on both sides of a guide; pins join elastic ones"
+                )
+        for drive in self.drives:
+            if drive.kind == "motion" and self.rotation_carrier(drive.body) in rods:
+                raise InvalidValueError(
+                    f"drive of {drive.body}: its motion cannot be given against an elastic body; expected kind effort"
+                )
 
 
 def _check_unique(kind: str, names: list[str]) -> None:

@@ -1,16 +1,17 @@
 """Where the bodies of a linkage are and how they move, over abstract scalars: positions, speeds, partial derivatives.
 
-The coordinates are angles of bodies against the ground, slides along guides, and the positions of free centres. So the
-velocity of a point is linear in the speeds, with the partial derivatives of its position; the rest of its
-acceleration, which is there while no speed changes, is its bias.
+The coordinates are angles of bodies against the ground, slides along guides, the positions of free centres, and the
+displacements of elastic rods. So the velocity of a point is linear in the speeds, with the partial derivatives of its
+position; the rest of its acceleration, which is there while no speed changes, is its bias.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from armwright.clearance.elastic_rod import Rod, Section
 from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage, Pin, round_to_right_angle
 from armwright.tracing.scalar import Scalar, cos, sin
 
@@ -43,6 +44,11 @@ class Vec2(NamedTuple):
 
 
 NOWHERE = Vec2(0.0, 0.0)
+
+
+def dot(row: Sequence[Scalar], column: Sequence[Scalar]) -> Scalar:
+    """Return the sum of the products of the numbers of two rows, as far as both have them."""
+    return sum((x * y for x, y in zip(row, column, strict=False)), 0.0)
 
 
 class Point(NamedTuple):
@@ -97,6 +103,54 @@ class Frame(NamedTuple):
         return Point(point.position.plus(arm), partials, velocity, bias)
 
 
+class PlacedRod(NamedTuple):
+    """A rod that moves with the linkage, bends and stretches.
+
+    Attributes:
+        rod: its shapes, masses and springs.
+        frame: of its body, with its axis from the first end of the rod to the other.
+        end: the first end.
+        numbers: of its own coordinates: bends and stretch.
+        bends: the values of these [m].
+        speeds: their speeds [m/s].
+    """
+
+    rod: Rod
+    frame: Frame
+    end: Point
+    numbers: list[int]
+    bends: list[Scalar]
+    speeds: list[Scalar]
+
+    def point(self, section: Section) -> Point:
+        """Return the middle of a section."""
+        if section.along == 0:
+            return self.end
+        *bends, stretch = self.bends
+        *bend_speeds, stretch_speed = self.speeds
+        shortenings = [dot(row, bends) for row in section.shortening]
+        ahead = section.along + section.stretch * stretch - 0.5 * dot(bends, shortenings)
+        ahead_speed = section.stretch * stretch_speed - dot(bend_speeds, shortenings)
+        shortening_rates = [dot(row, bend_speeds) for row in section.shortening]
+        aside_speed = dot(section.bends, bend_speeds)
+        along, across = self.frame.axis, self.frame.axis.perpendicular()
+        rigid = self.frame.shifted(self.end, along.times(ahead).plus(across.times(dot(section.bends, bends))))
+        partials = dict(rigid.partials)
+        for number, bend, shortening in zip(self.numbers, section.bends, shortenings, strict=False):
+            partials[number] = across.times(bend).minus(along.times(shortening))
+        partials[self.numbers[-1]] = along.times(section.stretch)
+        relative = along.times(ahead_speed).plus(across.times(aside_speed))
+        bias = relative.perpendicular().times(2.0 * self.frame.spin)
+        bias = bias.minus(along.times(dot(bend_speeds, shortening_rates)))
+        return Point(rigid.position, partials, rigid.velocity.plus(relative), rigid.bias.plus(bias))
+
+    def rotated(self, frame: Frame, section: Section) -> Frame:
+        """Return a frame of the body that rotates with a section."""
+        slopes = dict(zip(self.numbers, section.slopes, strict=False))
+        spin = frame.spin + dot(section.slopes, self.speeds)
+        return frame._replace(angle_partials=frame.angle_partials | slopes, spin=spin)
+
+
 class Placement:
     """All bodies of a linkage in one configuration."""
 
@@ -105,13 +159,16 @@ class Placement:
 
         Args:
             linkage: what moves.
-            q: its coordinates [rad, m].
+            q: its coordinates [rad, m]; those of rods may be left out, which then are straight and rigid.
             qd: their speeds [rad/s, m/s].
         """
-        self.linkage, self.q = linkage, q
+        self.linkage, self.q, self.qd = linkage, q, qd
+        self.rods: dict[str, PlacedRod] = {}
         still = Point(NOWHERE, {}, NOWHERE, NOWHERE)
         self.frames = {GROUND: Frame(Vec2(1.0, 0.0), {}, 0.0, still)}
         self._points: dict[BodyPoint, Point] = {}
+        rigid = len(linkage.rigid_coordinates)
+        rods, numbers = linkage.rods if len(q) > rigid else {}, iter(range(rigid, len(q)))
         number = 0
         for body in linkage.bodies:
             joint = linkage.joint(body.name)
@@ -134,17 +191,55 @@ class Placement:
             own_point = body.centre if joint is None else body.points[joint.point]
             origin = frame.shifted(joint_point, frame.arm(*map(float, own_point)).times(-1.0))
             self.frames[body.name] = frame._replace(origin=origin)
+            if body.name in rods:
+                self.rods[body.name] = self._place_rod(rods[body.name], body, numbers)
 
     def point(self, point: BodyPoint) -> Point:
         """Return a point of a body."""
         if point not in self._points:
             along, across = map(float, self.linkage.point(point))
-            self._points[point] = self.frames[point.body].point(along, across)
+            if point.body in self.rods:
+                self._points[point] = self.rods[point.body].point(self._section(point))
+            else:
+                self._points[point] = self.frames[point.body].point(along, across)
         return self._points[point]
 
+    def section(self, point: BodyPoint) -> Frame:
+        """Return the frame of a body, or of the section of a rod, at a point; its axis is that of the body."""
+        frame = self.frames[point.body]
+        return self.rods[point.body].rotated(frame, self._section(point)) if point.body in self.rods else frame
+
+    def masses(self, body: Body) -> Iterator[tuple[float, Point]]:
+        """Give the masses of a body, each in a point: all in its centre, or those of a rod."""
+        placed = self.rods.get(body.name)
+        if placed is None:
+            yield body.mass, self.centre(body)
+        else:
+            yield from ((mass, placed.point(section)) for mass, section in placed.rod.masses)
+
+    def inertia(self, body: Body) -> float:
+        """Return the inertia of a body about its centre, as far as it is not that of its masses [kg m²]."""
+        return 0.0 if body.name in self.rods else body.inertia
+
     def centre(self, body: Body) -> Point:
-        """Return the centre of mass of a body."""
+        """Return the centre of mass of a body; of a rod, that when it is straight."""
         return self.frames[body.name].point(*map(float, body.centre))
+
+    def _section(self, point: BodyPoint) -> Section:
+        return self.rods[point.body].rod.section_at(self.linkage.point(point))
+
+    def _place_rod(self, rod: Rod, body: Body, numbers: Iterator[int]) -> PlacedRod:
+        """Return a rod with its own coordinates, those of the next numbers."""
+        frame = self.frames[body.name]
+        chosen = [next(numbers) for _ in rod.stiffness]
+        return PlacedRod(
+            rod=rod,
+            frame=frame._replace(axis=_rotate(frame.axis, rod.direction)),
+            end=frame.point(*rod.start),
+            numbers=chosen,
+            bends=[self.q[i] for i in chosen],
+            speeds=[self.qd[i] for i in chosen],
+        )
 
     def _rotating(self, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Frame:
         axis = _rotate(Vec2(cos(q[number]), sin(q[number])), self.linkage.zero)

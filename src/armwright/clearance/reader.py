@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from armwright.clearance.elastic_rod import MAX_MODES, Elasticity
 from armwright.clearance.linkage import (
     GRAVITY,
     GROUND,
@@ -25,6 +26,8 @@ from armwright.files.document import Document, Table
 from armwright.files.inputs import file_path
 
 _Part = TypeVar("_Part")
+# The keys of which one gives the section of an elastic body; an area also needs second_moment_mm4.
+_SECTIONS = ("square_mm", "round_mm", "rectangle_mm", "tube_mm", "area_mm2")
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
 
@@ -107,7 +110,52 @@ def _body(table: Table) -> Body:
     name, mass = table.text("name"), table.positive("mass")
     inertia = table.number("inertia", default=0.0, lower=0.0)
     centre = table.vector("centre", 2, default=(0.0, 0.0))
-    return Body(name=name, mass=mass, inertia=inertia, centre=centre, points=_points(table))
+    below = table.table("elastic") if "elastic" in table else None
+    points = _points(table)
+    elastic = None if below is None else _elasticity(below, list(points))
+    return Body(name=name, mass=mass, inertia=inertia, centre=centre, points=points, elastic=elastic)
+
+
+def _elasticity(table: Table, points: list[str]) -> Elasticity:
+    """Return what makes a body elastic; its ends are the points of a body that has two."""
+    ends = table.texts("ends") if "ends" in table else points
+    if len(ends) != 2:
+        raise table.error("ends", f"expected the names of two points between which the body is a beam, got {len(ends)}")
+    area, second_moment = _section(table)
+    elastic = Elasticity(
+        ends=(ends[0], ends[1]),
+        area=area,
+        second_moment=second_moment,
+        young=table.number("young", default=Material().young, lower=1.0),
+        modes=table.whole("modes", 1, MAX_MODES, default=3),
+        damping=table.number("damping", default=0.01, lower=0.0, upper=0.99),
+    )
+    table.refuse_unknown_keys()
+    return elastic
+
+
+def _section(table: Table) -> tuple[float, float]:
+    """Return area [m²] and second moment of area [m⁴] of the section of a beam, however it is given."""
+    given = [key for key in _SECTIONS if key in table]
+    if len(given) != 1:
+        what = " and ".join(given) or "none"
+        raise table.error(None, f"expected one section, of {', '.join(_SECTIONS)}, got {what}")
+    if given == ["area_mm2"]:
+        return table.positive("area_mm2") * 1e-6, table.positive("second_moment_mm4") * 1e-12
+    if given == ["square_mm"]:
+        side = table.positive("square_mm") * 1e-3
+        return side**2, side**4 / 12
+    if given == ["round_mm"]:
+        across = table.positive("round_mm") * 1e-3
+        return math.pi / 4 * across**2, math.pi / 64 * across**4
+    first, second = (float(x) * 1e-3 for x in table.vector(given[0], 2))
+    if given == ["rectangle_mm"]:
+        if min(first, second) <= 0:
+            raise table.error("rectangle_mm", "expected a height in the plane and a width above 0")
+        return first * second, first**3 * second / 12
+    if not 0 <= second < first:
+        raise table.error("tube_mm", "expected an outer diameter and a smaller inner one")
+    return math.pi / 4 * (first**2 - second**2), math.pi / 64 * (first**4 - second**4)
 
 
 def _joint(table: Table) -> Pin | Guide:

@@ -113,7 +113,7 @@ def assembly_guess(linkage: Linkage) -> Array:
 
     Each free body is placed so that the first pin that joins it to a placed body is closed.
     """
-    coordinates = linkage.coordinates
+    coordinates = linkage.rigid_coordinates
     q = np.array([linkage.assembly.get(body, 0.0) if kind in ("angle", "slide") else 0.0 for body, kind in coordinates])
     waiting = [body.name for body in linkage.bodies if linkage.joint(body.name) is None]
     while waiting:

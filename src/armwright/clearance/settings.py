@@ -111,18 +111,37 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
     Raises:
         InvalidValueError: the step is too long.
     """
-    if K.size == 0:
-        return
-    lightest = min(body.mass for body in linkage.bodies) / 2
-    slope = 1.5 * float(K.max()) ** (2 / 3) * _USUAL_FORCE ** (1 / 3)
-    longest = _LARGEST_PART / np.sqrt(slope / lightest)
-    if settings.step > longest:
-        depth = largest_indentation(lightest, float(K.max()), 1.0, 0.0)
-        raise InvalidValueError(
-            f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which oscillate in "
-            f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
-            f"expected at most {_round_down(float(longest)):g} s"
-        )
+    if K.size > 0:
+        lightest = min(body.mass for body in linkage.bodies) / 2
+        slope = _usual_slope(float(K.max()))
+        longest = _LARGEST_PART / np.sqrt(slope / lightest)
+        if settings.step > longest:
+            depth = largest_indentation(lightest, float(K.max()), 1.0, 0.0)
+            raise InvalidValueError(
+                f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which oscillate in "
+                f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
+                f"expected at most {_round_down(float(longest)):g} s"
+            )
+    for name, rod in linkage.rods.items():
+        contacts = [
+            # The other side of a contact may be as light.
+            (2 * _usual_slope(float(K[..., i].max())), rod.section_at(linkage.point(end)))
+            for i, pin in enumerate(linkage.pins)
+            for end in (pin.bearing, pin.journal)
+            if end.body == name
+        ]
+        fastest = rod.fastest_vibration(contacts)
+        if settings.step * fastest > _LARGEST_PART:
+            raise InvalidValueError(
+                f"step: {settings.step:g} s is too long for elastic body {name}, which vibrates in its contacts in "
+                f"{2 * np.pi / fastest:.2g} s; expected at most {_round_down(_LARGEST_PART / fastest):g} s, or "
+                f"fewer modes"
+            )
+
+
+def _usual_slope(K: float) -> float:
+    """Return the slope of the force of a typical contact [N/m]."""
+    return float(1.5 * K ** (2 / 3) * _USUAL_FORCE ** (1 / 3))
 
 
 def _round_down(seconds: float) -> float:

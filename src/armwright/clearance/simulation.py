@@ -15,7 +15,6 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats, leading_axes
 from armwright.clearance.contact import damping
-from armwright.clearance.equations import WORKS
 from armwright.clearance.ideal import pin_gaps, tip_position
 from armwright.clearance.kernel import Integrator, Layout, emit_simulation
 from armwright.clearance.lane_layout import Integers
@@ -126,7 +125,7 @@ def simulate(
     layout = Layout(linkage=linkage, friction=settings.friction, control=settings.control, located=settings.located)
     start = np.zeros((*lead, layout.states))
     start[..., : layout.n] = initial_coordinates(scenario, c, K)
-    start[..., layout.n : 2 * layout.n] = scenario.ideal.qd[0]
+    start[..., layout.n : layout.n + scenario.ideal.qd.shape[-1]] = scenario.ideal.qd[0]
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
@@ -135,7 +134,7 @@ def simulate(
 
 
 def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Array:
-    """Return (..., n) the coordinates from which runs start.
+    """Return (..., n) the coordinates from which runs start; elastic rods are bent as they are at rest.
 
     Args:
         scenario: the prepared path.
@@ -144,6 +143,8 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Arra
     """
     ideal = scenario.ideal.q[0]
     if scenario.settings.start == "centred":
+        if scenario.linkage.rods:
+            return find_static_equilibrium(scenario.linkage, ideal, np.zeros_like(clearances)).q
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
     elastic = None if scenario.settings.start == "rigid" else K
     return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic).q
@@ -212,7 +213,7 @@ def _unpack_record(scenario: Scenario, layout: Layout, c: Array, mu: Array, reco
         tip=tip,
         error=error,
         forces=samples[..., layout.states :],
-        works={name: samples[..., first + i] for i, name in enumerate(WORKS)},
+        works={name: samples[..., first + i] for i, name in enumerate(layout.works)},
         impacts=record.impacts.reshape(*lead, layout.pins),
         peaks=record.peaks.reshape(*lead, layout.pins),
         status=np.where(diverged, Status.DIVERGED, Status.FINISHED),

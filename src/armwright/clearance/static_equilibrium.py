@@ -2,7 +2,8 @@
 
 Without friction the force in each pin acts through the centres of bearing and journal. So a journal is displaced in the
 direction of the force that it carries, and indents the wall as that force requires; direction and geometry depend a
-little on each other, and a few iterations find both.
+little on each other, and a few iterations find both. Where rods are elastic, all this and the balance of their springs
+are solved together by Newton's method.
 
 Source:
     Spec of the clearance, 0.1 and 4.3.
@@ -14,7 +15,17 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.ideal import close_pins, inverse_dynamics, pin_gaps, tip_position
+from armwright.clearance.equations import free_forces, rod_springs
+from armwright.clearance.ideal import (
+    close_pins,
+    effects,
+    inverse_dynamics,
+    pin_gaps,
+    place_bodies,
+    solve,
+    stack,
+    tip_position,
+)
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError
 
@@ -23,6 +34,8 @@ _MAX_ITERATIONS = 60
 _CONVERGED = 1e-14
 # Changes below this are rounding; an iteration that ends with larger ones has not converged [rad, m].
 _ROUNDING = 1e-9
+# Differences of coordinates from which derivatives follow [rad, m].
+_DIFFERENCE = 1e-6
 # A pin that carries less force has no contact direction [N].
 _NO_FORCE = 1e-9
 
@@ -32,7 +45,7 @@ class StaticEquilibrium:
     """A linkage with clearance at rest.
 
     Attributes:
-        q: (..., n) coordinates [rad, m].
+        q: (..., n) coordinates, those of elastic rods among them [rad, m].
         tip: (..., 2) position of its tip [m].
         gaps: (..., p, 2) from the centre of each bearing to that of its journal [m].
         forces: (..., p) normal force of each contact [N].
@@ -50,7 +63,7 @@ def find_static_equilibrium(
     """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
 
     Args:
-        linkage: with n coordinates and p pins.
+        linkage: with p pins, and n coordinates without those of elastic rods.
         ideal: (..., n) coordinates with closed pins, at which the drives are locked.
         clearances: (..., p) [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5]; rigid ones when left out.
@@ -81,11 +94,67 @@ def find_static_equilibrium(
         if np.all(converged):
             break
     if np.any(~converged & (moved > _ROUNDING)):
-        raise InvalidValueError(
-            f"{linkage.name} has no equilibrium: after {_MAX_ITERATIONS} iterations it still moves by "
-            f"{moved.max():.2g}; expected drives locked away from singular configurations"
-        )
+        raise _no_equilibrium(linkage, moved)
+    if linkage.rods:
+        q, size = _with_elastic_rods(linkage, q, drives, c, np.broadcast_to(np.asarray(K), c.shape))
     return StaticEquilibrium(q=q, tip=tip_position(linkage, q), gaps=pin_gaps(linkage, q), forces=size)
+
+
+def _with_elastic_rods(
+    linkage: Linkage, rigid: Array, drives: Array, clearances: Array, K: Array
+) -> tuple[Array, Array]:
+    """Return (..., n) coordinates with elastic rods, and (..., p) the forces of the pins.
+
+    Args:
+        linkage: with elastic rods.
+        rigid: (..., m) coordinates of the equilibrium with rigid rods.
+        drives: (..., d) of them, where they are locked.
+        clearances: (..., p) [m].
+        K: (..., p) stiffness of the contacts [N/m^1.5].
+    """
+    m, n = rigid.shape[-1], len(linkage.coordinates)
+    q = np.concatenate([rigid, np.zeros((*rigid.shape[:-1], n - m))], axis=-1)
+    steps = _DIFFERENCE * np.eye(n)
+    converged = np.zeros((*q.shape[:-1], 1), dtype=bool)
+    for _ in range(_MAX_ITERATIONS):
+        residuals, _ = _elastic_residuals(linkage, q, drives, clearances, K)
+        rows = [np.expand_dims(x, -2) for x in (q, drives, clearances, K)]
+        above, below = (_elastic_residuals(linkage, rows[0] + side * steps, *rows[1:])[0] for side in (1, -1))
+        change = solve(np.swapaxes(above - below, -1, -2) / (2 * _DIFFERENCE), -residuals)
+        moved = np.abs(change).max(axis=-1, keepdims=True)
+        q = np.where(converged, q, q + change)
+        converged |= moved < _CONVERGED
+        if np.all(converged):
+            break
+    if not np.all(converged | (moved < _ROUNDING)):
+        raise _no_equilibrium(linkage, moved)
+    return q, _elastic_residuals(linkage, q, drives, clearances, K)[1]
+
+
+def _elastic_residuals(linkage: Linkage, q: Array, drives: Array, clearances: Array, K: Array) -> tuple[Array, Array]:
+    """Return (..., n) what is left of the equations of an equilibrium [m, rad], and (..., p) the forces of the pins.
+
+    The forces on the coordinates of the bodies determine the reactions. Then gaps have to point along these, drives to
+    be where they are locked, and the springs of the rods to be in balance with what bends them.
+    """
+    lead, d, m = q.shape[:-1], len(linkage.drives), len(linkage.rigid_coordinates)
+    placement = place_bodies(linkage, q)
+    force, matrix = stack(lead, free_forces(placement)), effects(placement)
+    loads = solve(matrix[..., :m, :], -force[..., :m])
+    reactions = loads[..., d:].reshape(*lead, len(linkage.pins), 2)
+    size = force_magnitudes(linkage, reactions)
+    gaps = reactions * ((clearances + (size / K) ** (2 / 3)) / size)[..., None]
+    apart = (pin_gaps(linkage, q) - gaps).reshape(*lead, -1)
+    unbalanced = force[..., m:] + (matrix[..., m:, :] @ loads[..., None])[..., 0]
+    stiffness = [k for _, k, _ in rod_springs(placement)]
+    return np.concatenate([apart, q[..., list(linkage.driven)] - drives, unbalanced / stiffness], axis=-1), size
+
+
+def _no_equilibrium(linkage: Linkage, moved: Array) -> InvalidValueError:
+    return InvalidValueError(
+        f"{linkage.name} has no equilibrium: after {_MAX_ITERATIONS} iterations it still moves by "
+        f"{moved.max():.2g}; expected drives locked away from singular configurations, and rods that do not buckle"
+    )
 
 
 def force_magnitudes(linkage: Linkage, reactions: Array) -> Array:
