@@ -2,6 +2,7 @@
 
 import csv
 import json
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -167,3 +168,30 @@ def test_pick_and_place() -> None:
     done = armwright("clearance", "simulate", "five-bar", "--path", "pick-and-place", "--step", "2e-5", "--json")
 
     assert [one["time"] for one in json.loads(done.stdout)["targets"]] == pytest.approx([0.0, 0.25, 0.5])
+
+
+def test_elastic_rod(tmp_path: Path) -> None:
+    """A linkage with an elastic rod has its bending in the table, the summary and the samples, and loses no energy."""
+    slider = resources.files("armwright.clearance.catalogue").joinpath("slider-crank.toml").read_text("utf-8")
+    points = "points = { A = [0.0, 0.0], B = [0.12, 0.0] }"
+    assert points in slider
+    file = tmp_path / "elastic.toml"
+    file.write_text(slider.replace(points, f"{points}\nelastic = {{ square_mm = 6, modes = 1 }}"), encoding="utf-8")
+
+    done = armwright(
+        "clearance", "simulate", file, "--speed-rpm", "120", "--revolutions", "0.02", "--step", "4e-6",
+        "-o", tmp_path / "out", columns=100,
+    )  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    told = json.loads((tmp_path / "out" / "summary.json").read_text())
+    rod, energy = told["rods"]["rod"], told["energy"]
+    assert 1e-6 < rod["bent_at_start"] < rod["bent_at_most"] < 1e-3
+    assert f"{rod['frequencies'][0]:.4g}" in next(line for line in done.stdout.splitlines() if "on pins" in line)
+    assert energy["damping_loss"] > 0
+    assert energy["imbalance"] < 0.02 * energy["driven"]
+    with (tmp_path / "out" / "samples.csv").open() as samples:
+        rows = list(csv.DictReader(samples))
+    assert max(abs(float(row["rod.bend1_m"])) for row in rows) == pytest.approx(rod["bent_at_most"], rel=1e-8)
+    assert float(rows[-1]["damping_loss_J"]) == pytest.approx(energy["damping_loss"], rel=1e-8)
+    assert "bent at the start" in (tmp_path / "out" / "report.html").read_text()

@@ -14,6 +14,7 @@ from armwright.arrays import Array, finite_or_none
 from armwright.clearance.contact import damping, restitution_of_damping
 from armwright.clearance.energy_balance import EnergyBalance, energy_balance
 from armwright.clearance.features import spectrum
+from armwright.clearance.linkage import Coordinate
 from armwright.clearance.predictability import DISTANCE_DIVISOR, MAX_DISTANCE, Predictability
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
@@ -22,6 +23,8 @@ from armwright.version import __version__
 
 # Residuals of the energy balance above this part of the losses, and above this energy [J], have a note.
 _MAX_IMBALANCE, _NEGLIGIBLE = 0.02, 1e-4
+# What elastic bodies add to the table of energies.
+_ROD_ENERGY = {"strain_change": "more strain in elastic bodies", "damping_loss": "lost in their damping"}
 # Indentation beyond which the contact law of Hertz does not hold, as a part of the clearance.
 _MAX_INDENTATION = 0.1
 
@@ -103,7 +106,7 @@ class ClearanceRun:
         notes.extend(_predictability_notes(self))
         energy, rows = self.energy, slice(self.rows)
         # The error of the integration has to be small beside the losses, not beside the work that went through.
-        lost = float((energy.impact_loss + energy.friction_loss)[rows][-1])
+        lost = float((energy.impact_loss + energy.friction_loss + energy.damping_loss)[rows][-1])
         imbalance = float(np.abs(energy.imbalance[rows]).max())
         if imbalance > max(_MAX_IMBALANCE * lost, _NEGLIGIBLE):
             part = f", {100 * imbalance / lost:.2g} % of them" if lost > 0 else ""
@@ -147,13 +150,15 @@ class ClearanceRun:
                 "impact_loss": float(energy.impact_loss[last]),
                 "friction_loss": float(energy.friction_loss[last]),
                 "imbalance": float(np.abs(energy.imbalance[: self.rows]).max()),
+                **_rod_energy(self),
             },
+            **({"rods": _rod_data(self)} if scenario.linkage.rods else {}),
             "settings": settings_data(self),
             "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
         }
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the pins, the errors at the targets, and errors and energy in sum."""
+        """Give the pins, the errors at the targets, errors and energy in sum, and the elastic bodies, if any."""
         data = self.as_data()
         yield ResultTable(
             title="Pins",
@@ -200,10 +205,63 @@ class ClearanceRun:
                 ("work of the drives", f"{energy['driven']:.4g}", "J"),
                 ("lost in impacts", f"{energy['impact_loss']:.4g}", "J"),
                 ("lost in friction", f"{energy['friction_loss']:.4g}", "J"),
+                *((name, f"{energy[key]:.4g}", "J") for key, name in _ROD_ENERGY.items() if key in energy),
                 ("residual of the energy balance", f"{energy['imbalance']:.2g}", "J"),
             ],
             numbers=(1,),
         )
+        if "rods" in data:
+            yield ResultTable(
+                title="Elastic bodies",
+                heads=(
+                    "body",
+                    "held as",
+                    "first frequency Hz",
+                    "bent at the start mm",
+                    "bent at most mm",
+                    "stretched µm",
+                ),
+                rows=[
+                    (
+                        name,
+                        "clamped" if rod["clamped"] else "on pins",
+                        f"{rod['frequencies'][0]:.4g}",
+                        f"{rod['bent_at_start'] * 1e3:.4g}",
+                        f"{rod['bent_at_most'] * 1e3:.4g}",
+                        f"{rod['stretched_at_most'] * 1e6:.3g}",
+                    )
+                    for name, rod in data["rods"].items()
+                ],
+                numbers=range(2, 6),
+            )
+
+
+def _rod_data(run: ClearanceRun) -> dict[str, Any]:
+    """Return how far each elastic body bends from the line of its frame, and stretches [m]."""
+    linkage, rods = run.simulation.scenario.linkage, {}
+    for name, rod in linkage.rods.items():
+        first = linkage.coordinates.index(Coordinate(name, "bend1"))
+        q = run.simulation.q[: run.rows, first : first + len(rod.stiffness)]
+        bent = rod.largest_deflection(q[:, :-1])
+        rods[name] = {
+            "clamped": rod.clamped,
+            "frequencies": list(rod.frequencies),
+            "bent_at_start": float(bent[0]),
+            "bent_at_most": float(bent.max()),
+            "stretched_at_most": float(np.abs(q[:, -1]).max()),
+        }
+    return rods
+
+
+def _rod_energy(run: ClearanceRun) -> dict[str, float]:
+    """Return what elastic bodies add to the energy balance [J]."""
+    if not run.simulation.scenario.linkage.rods:
+        return {}
+    energy, last = run.energy, run.rows - 1
+    return {
+        "strain_change": float(energy.strain[last] - energy.strain[0]),
+        "damping_loss": float(energy.damping_loss[last]),
+    }
 
 
 def _pin_data(run: ClearanceRun, i: int) -> dict[str, Any]:

@@ -164,6 +164,20 @@ class Rod:
         return np.asarray(np.abs(bends @ self._shapes.bends(stations)).max(axis=-1), dtype=np.float64)
 
 
+def refuse_rods(what: str, rods: Iterable[str]) -> None:
+    """Refuse elastic bodies where all have to be rigid.
+
+    Args:
+        what: refuses them.
+        rods: names of the elastic bodies.
+
+    Raises:
+        InvalidValueError: there are any.
+    """
+    if names := ", ".join(rods):
+        raise InvalidValueError(f"{what}: expected rigid bodies, got elastic {names}; leave out their 'elastic'")
+
+
 class RodBody(NamedTuple):
     """The numbers of a body whose rod is asked for.
 

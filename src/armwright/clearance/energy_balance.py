@@ -11,6 +11,9 @@ from armwright.clearance.placement import Placement
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.simulation import Simulation
 
+# The fields of a balance that are 0 without elastic bodies.
+ENERGY_OF_RODS = ("strain", "damping_loss")
+
 
 @attrs.frozen(kw_only=True, eq=False)
 class EnergyBalance:

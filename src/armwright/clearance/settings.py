@@ -133,9 +133,9 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
         fastest = rod.fastest_vibration(contacts)
         if settings.step * fastest > _LARGEST_PART:
             raise InvalidValueError(
-                f"step: {settings.step:g} s is too long for elastic body {name}, which vibrates in its contacts in "
-                f"{2 * np.pi / fastest:.2g} s; expected at most {_round_down(_LARGEST_PART / fastest):g} s, or "
-                f"fewer modes"
+                f"step: {settings.step:g} s is too long for elastic body {name}, whose fastest shape vibrates in "
+                f"{2 * np.pi / fastest:.2g} s; expected at most {_round_down(_LARGEST_PART / fastest):g} s"
+                f"{', or fewer modes' if len(rod.frequencies) > 1 else ''}"
             )
 
 

@@ -8,7 +8,7 @@ import attrs
 
 from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
-from armwright.clearance.energy_balance import EnergyBalance
+from armwright.clearance.energy_balance import ENERGY_OF_RODS, EnergyBalance
 from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.clearance_run_page import clearance_run_page
 from armwright.report.five_bar_figure import scenario_workspace
@@ -51,5 +51,7 @@ def samples_csv(run: ClearanceRun) -> Iterator[str]:
         columns[f"{pin.name}.depth_m"] = run.depths[rows, i]
         columns[f"{pin.name}.force_N"] = simulation.forces[rows, i]
     for field in attrs.fields(EnergyBalance):
+        if field.name in ENERGY_OF_RODS and not linkage.rods:
+            continue
         columns[f"{field.name}_J"] = getattr(run.energy, field.name)[rows]
     return csv_lines(columns, 10)

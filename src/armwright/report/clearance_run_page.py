@@ -114,7 +114,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
         HTML text; write it as UTF-8.
     """
     data = run.as_data()
-    pins, targets, totals = run.tables()
+    pins, targets, totals, *rods = run.tables()
     shown = [drawing for drawing in drawn if drawing.name in _STATIC_FIGURES]
     return page_html(
         title=title,
@@ -125,6 +125,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
             headline=headline(_tiles(run, data)) + remarks(note for note in run.notes if note not in run.warnings),
             pins=table(pins),
             targets=table(attrs.evolve(targets, heads=[_DIRECTED.get(head, head) for head in targets.heads])),
+            rods="".join(table(rod) for rod in rods),
             totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
             settings=pairs(_settings(data)),
             figures=figures(sorted(shown, key=lambda drawing: _STATIC_FIGURES.index(drawing.name))),

@@ -12,6 +12,7 @@ import numpy as np
 
 from armwright.arrays import Array, floats
 from armwright.clearance.contact import ImpactLaw
+from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage
 from armwright.clearance.placement import Placement
 from armwright.clearance.scenario import Scenario
@@ -33,8 +34,9 @@ def exudyn_files(scenario: Scenario) -> dict[str, str]:
             without a controller, and no body that is driven along a guide.
 
     Raises:
-        InvalidValueError: Exudyn has no counterpart for something.
+        InvalidValueError: Exudyn has no counterpart for something, or a body is elastic.
     """
+    refuse_rods("export to Exudyn", scenario.linkage.rods)
     _check(scenario)
     linkage = scenario.linkage
     run = simulate(scenario, linkage.clearance_array(None))

@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, not_negative, positive
+from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
 from armwright.clearance.predictability import perturb_clearances, select_run
@@ -239,9 +240,10 @@ def assess_wear(
         progress: called with the number of steps made, and of all.
 
     Raises:
-        InvalidValueError: see ``wear_life``.
+        InvalidValueError: a body is elastic, or see ``wear_life``.
         UnknownNameError: there is no such measure.
     """
+    refuse_rods("wear", linkage.rods)
     not_negative(spread, "spread of the wear coefficient")
     for name, limit in (limits or {}).items():
         positive(limit, f"limit of {one_of('measure', name, ('AP', 'RP', 'path'))}", "m")
