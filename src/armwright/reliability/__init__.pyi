@@ -19,6 +19,10 @@ from .first_order import (
 )
 from .life_file import LifeFile as LifeFile, PlayGrowth as PlayGrowth, read_life_file as read_life_file
 from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
+from .linkage_tolerances import (
+    LinkageTolerances as LinkageTolerances,
+    read_linkage_tolerances as read_linkage_tolerances,
+)
 from .play_life import (
     PlayLife as PlayLife,
     WearRates as WearRates,
@@ -31,6 +35,10 @@ from .reducer_life import (
     joint_speed as joint_speed,
     life_hours as life_hours,
     load_of as load_of,
+)
+from .tip_errors import (
+    assess_linkage_tolerances as assess_linkage_tolerances,
+    sampled_tip_errors as sampled_tip_errors,
 )
 from .tolerances import (
     Tolerance as Tolerance,

@@ -98,6 +98,7 @@ def _errors(assessment: ToleranceAssessment) -> str:
     if assessment.limit is not None:
         axes.axhline(assessment.limit * 1e3, color="C7", linestyle=":", label="limit")
     axes.set_ylim(bottom=0)
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.legend(fontsize="small")
     return svg_text(figure, "Error along the poses")
 
