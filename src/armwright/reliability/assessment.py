@@ -190,6 +190,7 @@ class ToleranceAssessment:
         yield "statistical, mm", self._number(self.statistical), _mm(self.statistical.max())
         mean, kind = self.sampled.mean(axis=0), self.mechanism.kind
         yield f"mean error of sampled {kind}s, mm", self._number(mean), _mm(mean.max())
+        yield f"{self.mechanism.complete} against linear law", "", f"{100 * self.nonlinearity:.2g} %"
         if self.limit is None or self.at_poses is None or self.on_path is None:
             return
         beyond, count = int((self.sampled > self.limit).any(axis=1).sum()), len(self.sampled)

@@ -97,9 +97,10 @@ def _errors(assessment: ToleranceAssessment) -> str:
         axes.plot(poses, assessment.mean * 1e3, "-.", color="C2", label="mean dimensions")
     if assessment.limit is not None:
         axes.axhline(assessment.limit * 1e3, color="C7", linestyle=":", label="limit")
-    axes.set_ylim(bottom=0)
-    axes.xaxis.get_major_locator().set_params(integer=True)
-    axes.legend(fontsize="small")
+    # Room for the legend above the lines.
+    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
+    axes.locator_params(axis="x", integer=True)
+    axes.legend(fontsize="small", loc="upper right", ncols=2)
     return svg_text(figure, "Error along the poses")
 
 
