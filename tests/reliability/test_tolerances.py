@@ -266,6 +266,8 @@ def test_least_cost_beside_a_mean_error(rule: str, rng: np.random.Generator) -> 
         assert error_bounds(error, found.half_widths, rule)[0].max() <= limit * (1 + 1e-9)
         assert found.costs.sum() <= found.least_cost * (1 + 1e-6)
     assert held.costs.sum() > free.costs.sum()
+    narrow = [Tolerance(name=f"x{i}", half_width=0.01, most=0.02) for i in range(3)]
+    np.testing.assert_array_equal(allocate(narrow, line, limit, rule).half_widths, [0.02] * 3)
     with pytest.raises(InvalidValueError, match="limit: expected more than the mean error, 400 mm"):
         allocate(named(np.ones(3)), line, mean, rule)
 

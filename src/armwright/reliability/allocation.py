@@ -129,7 +129,7 @@ def allocate(tolerances: Sequence[Tolerance], error: LinearError, limit: float, 
             best = min(best, within, key=lambda x: float((start_costs * (start / x) ** exponent).sum()))
             if (start_costs * (start / best) ** exponent).sum() <= least * (1 + _GAP):
                 break
-        over = np.flatnonzero(bounds >= limit * (1 - 1e-12))
+        over = np.flatnonzero(bounds >= min(limit, bounds.max()) * (1 - 1e-12))
         left = limit - (directions[over] * error.offset[over]).sum(axis=-1, keepdims=True)
         new = np.abs(np.einsum("pd,pdk->pk", directions[over], error.jacobian[over]) * start / left) ** power
         planes = np.concatenate([planes, new])

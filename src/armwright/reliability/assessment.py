@@ -127,7 +127,7 @@ class ToleranceAssessment:
                 "trust the sampled ones."
             )
         if self.on_path is not None and self.on_path.standard_error > 0.1 * self.on_path.probability:
-            notes.append("The probability on the path is rough: more --samples make it finer.")
+            notes.append("The probability on the path is rough: its standard error is more than a tenth of it.")
         return (*notes, *self.mechanism.notes)
 
     def as_data(self) -> dict[str, Any]:
