@@ -102,15 +102,16 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
     q, qd = simulation.q[:rows], simulation.qd[:rows]
     if not np.all(np.isfinite(q)):
         raise InvalidValueError(f"{linkage.name}: the run diverged, so that nothing can be said of its wear")
-    angles, gaps = pin_angles(linkage, q, qd), simulation.gaps[:rows]
+    angles, gaps = pin_angles(linkage, q, qd), simulation.gaps
+    gradients = simulation.contact_geometry(gaps)[1][:rows]
+    gaps, outward = gaps[:rows], gradients / np.linalg.norm(gradients, axis=-1, keepdims=True)
     placement = Placement(linkage, list(q.T), list(qd.T))
     slips = []
     for i, pin in enumerate(linkage.pins):
         velocity = placement.point(pin.journal).velocity.minus(placement.point(pin.bearing).velocity)
         moved = np.stack(np.broadcast_arrays(*velocity, q[:, 0])[:2], axis=-1)
         spins = angles.journal_spin[:, i], angles.bearing_spin[:, i]
-        slips.append(_slip(pin.journal_radius, gaps[:, i], moved, *spins))
-    outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
+        slips.append(_slip(pin.journal_radius, (gaps[:, i] * outward[:, i]).sum(axis=-1), outward[:, i], moved, *spins))
     return ContactHistory(
         time=simulation.time[:rows],
         forces=rotate(outward * simulation.forces[:rows, :, None], -angles.bearing),
@@ -125,7 +126,9 @@ def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles)
     slips = []
     for i, pin in enumerate(linkage.pins):
         spins = angles.journal_spin[:, i], angles.bearing_spin[:, i]
-        slips.append(_slip(pin.journal_radius, gaps[:, i], velocities[:, i], *spins))
+        distance = np.linalg.norm(gaps[:, i], axis=-1)
+        outward = gaps[:, i] / distance[:, None]
+        slips.append(_slip(pin.journal_radius, distance, outward, velocities[:, i], *spins))
     return np.stack(slips, axis=-1)
 
 
@@ -135,8 +138,9 @@ def rotate(vectors: Array, angles: Array) -> Array:
     return np.stack([c * vectors[..., 0] - s * vectors[..., 1], s * vectors[..., 0] + c * vectors[..., 1]], axis=-1)
 
 
-def _slip(radius: float, gap: Array, velocity: Array, journal_spin: Array, bearing_spin: Array) -> Array:
-    """Return (s,) the velocity of the surface of a journal of this radius along the wall that it touches."""
-    distance = np.linalg.norm(gap, axis=-1)
-    along = np.stack([-gap[:, 1], gap[:, 0]], axis=-1) / distance[:, None]
+def _slip(
+    radius: float, distance: Array, outward: Array, velocity: Array, journal_spin: Array, bearing_spin: Array
+) -> Array:
+    """Return (s,) the velocity of the surface of a journal of this radius along the wall of this normal (s, 2)."""
+    along = np.stack([-outward[:, 1], outward[:, 0]], axis=-1)
     return np.asarray((velocity * along).sum(axis=-1) + journal_spin * radius - bearing_spin * (radius + distance))
