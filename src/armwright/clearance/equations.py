@@ -160,6 +160,7 @@ def rates(
     state: State,
     drives: Sequence[Scalar],
     contacts: Sequence[Contact],
+    *,
     walls: Sequence[Wall] | None = None,
 ) -> Rates:
     """Return the accelerations, efforts, powers and energies of a linkage with clearance.
@@ -176,8 +177,8 @@ def rates(
     force = free_forces(placement)
     pins, impact_loss, friction_loss, stored = [], 0.0, 0.0, 0.0
     unworn = [None] * len(linkage.pins)
-    for parameters in zip(linkage.pins, contacts, state.memories, walls or unworn, strict=True):
-        pin = _pin_contact(placement, friction, *parameters)
+    for *parameters, worn in zip(linkage.pins, contacts, state.memories, walls or unworn, strict=True):
+        pin = _pin_contact(placement, friction, *parameters, worn=worn)
         for i, push in pin.forces.items():
             force[i] = force[i] + push
         pins.append(pin)
@@ -376,7 +377,7 @@ def _touch(placement: Placement, pin: ClearancePin, clearance: Scalar, worn: Wal
     # The wall turns with the bearing, and what the journal has lost turns with the journal.
     rate = velocity.dot(gradient) + worn.slope * hole - worn.turning * (shaft - hole)
     steepness = sqrt(gradient.dot(gradient))
-    outward = gradient.times(1.0 / steepness)
+    outward = gradient.times(1.0 / select(steepness > _TINY, steepness, 1.0))
     depth = distance - (clearance + worn.growth)
     inside = pin.journal_radius - depth
     touch = gap.dot(outward) + inside, inside, gap.plus(outward.times(inside))
@@ -389,6 +390,7 @@ def _pin_contact(
     pin: ClearancePin,
     contact: Contact,
     memory: ContactMemory,
+    *,
     worn: Wall | None,
 ) -> PinContact:
     """Return the contact in a pin.

@@ -43,8 +43,8 @@ CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 _SIGNATURE = """SIGNATURE = types.void(
     int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True),
     types.Array(float64, 1, "C", readonly=True), types.Array(int64, 1, "C", readonly=True),
-    types.Array(float64, 3, "C", readonly=True), types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
-    types.Array(int64, 1, "C"),
+    types.Array(float64, 3, "C", readonly=True), types.Array(float64, 3, "C"), types.Array(int64, 2, "C"),
+    types.Array(float64, 2, "C"), types.Array(int64, 1, "C"),
 )
 """
 _COMPILED = '@njit(error_model="numpy")'
@@ -148,7 +148,7 @@ class Layout:
     def rates(self, x: Sequence[Scalar]) -> list[Scalar]:
         """Return the rates of the state, memory and force of each pin, and, where located, depths and their rates."""
         state, drives, contacts, walls = self.unpack(x)
-        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts, walls)
+        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts, walls=walls)
         pins = linkage_rates.pins
         bristles = [pin.deflection_rate for pin in pins][: self.deflections]
         impacts = [x for pin in pins for x in (pin.memory.touching, pin.memory.speed, pin.normal)]

@@ -103,7 +103,8 @@ class Simulation:
         if self.worn is not None:
             return self.worn.gradients(self.scenario.linkage, self.q, gaps, clearances)
         size = np.linalg.norm(gaps, axis=-1)
-        return np.asarray(size - clearances, dtype=np.float64), gaps / size[..., None]
+        outward = gaps / np.maximum(size, np.finfo(float).tiny)[..., None]
+        return np.asarray(size - clearances, dtype=np.float64), outward
 
 
 class Record(NamedTuple):
@@ -153,8 +154,7 @@ def simulate(
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
-    walls = np.zeros((0, 0, 0)) if worn is None else worn.table
-    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, walls, threads)
+    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, worn=worn, threads=threads)
     return attrs.evolve(_unpack_record(scenario, layout, c, mu, record), worn=worn)
 
 
@@ -194,9 +194,16 @@ def _broadcast_parameters(
 
 
 def _run_lanes(
-    scenario: Scenario, layout: Layout, start: Array, contacts: Array, walls: Array, threads: int | None
+    scenario: Scenario,
+    layout: Layout,
+    start: Array,
+    contacts: Array,
+    *,
+    worn: WornWalls | None,
+    threads: int | None,
 ) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
+    walls = np.zeros((0, 0, 0)) if worn is None else worn.table
     runs, pins, rows = len(start), layout.pins, len(scenario.table)
     marks = scenario.marks[: rows + 1]
     samples = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import floor
 
 from armwright.arrays import Array
-from armwright.clearance.lane_layout import FIRST_WALL, LANES, PINS, Integers
+from armwright.clearance.lane_layout import FIRST_WALL, LANES, PINS
 
 # A place farther than so many cells from the first is no number any more.
 FARTHEST_CELL = 1e9

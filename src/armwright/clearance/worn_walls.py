@@ -28,6 +28,8 @@ from armwright.clearance.placement import Placement
 
 # Directions in which a journal may touch the wall beside the one that it is pushed in [rad].
 _BESIDE = 1.4
+# Cells of the table round each angle; an angle of more cells is no number any more.
+_CELLS, _FARTHEST = 360, 1e9
 # An equilibrium is bracketed to this part of a cell of the table by so many halvings.
 _HALVINGS = 45
 
@@ -60,7 +62,7 @@ class PinDirections(NamedTuple):
 
 @attrs.frozen(kw_only=True, eq=False)
 class WornWalls:
-    """The walls of p worn pins, in m directions and at m rotations from the axes of the bodies of their bearings.
+    """The walls of p worn pins, in m = 360 directions and at as many rotations, from the axes of their bodies.
 
     Attributes:
         table: (p, m + 3, m + 3) growth of the walls by rotation and direction [m]; the first cells are repeated behind
@@ -79,30 +81,26 @@ class WornWalls:
 
         Args:
             linkage: with p pins, new.
-            bearing: (p, m) depths gone from the bearings, from the axes of their bodies [m].
-            journal: (p, m) from the journals likewise [m].
+            bearing: (p, n) depths gone from the bearings, in n directions from the axes of their bodies [m].
+            journal: (p, n) from the journals likewise [m].
         """
         clearances = list(linkage.clearances.values())
+        bearing, journal = (np.stack([_resampled(profile) for profile in side]) for side in (bearing, journal))
         growths = np.stack([_growth(*of_pin) for of_pin in zip(clearances, bearing, journal, strict=True)])
         table = np.pad(growths, ((0, 0), (1, 2), (1, 2)), mode="wrap")
-        walls = cls(table=table, means=bearing.mean(axis=-1) + journal.mean(axis=-1), smoothing=np.zeros(len(growths)))
-        m = growths.shape[-1]
-        grid = np.meshgrid(np.arange(m) * (2 * np.pi / m), np.arange(m) * (2 * np.pi / m), indexing="ij")
-        changes = [np.abs(walls.at(i, grid[1], grid[0]).growth - growths[i]).max() for i in range(len(growths))]
-        return attrs.evolve(walls, smoothing=np.array(changes))
+        angles = np.arange(_CELLS) * (2 * np.pi / _CELLS)
+        changes = [
+            wall_at(one, angles[None], angles[:, None]).growth - g for one, g in zip(table, growths, strict=True)
+        ]
+        return cls(
+            table=table,
+            means=bearing.mean(axis=-1) + journal.mean(axis=-1),
+            smoothing=np.abs(changes).max(axis=(1, 2)),
+        )
 
     def at(self, pin: int, direction: Array, rotation: Array) -> WallPlace:
         """Return the wall of a pin in directions (...) at rotations of its journal (...) [rad]."""
-        table = self.table[pin]
-        m = len(table) - 3
-        column, along, along_rate = _spline_weights(direction * (m / (2 * np.pi)), m)
-        row, across, across_rate = _spline_weights(rotation * (m / (2 * np.pi)), m)
-        cells = table[row[..., None, None] + np.arange(4)[:, None], column[..., None, None] + np.arange(4)]
-        growth, slope, turning = (
-            np.einsum("...ij,...i,...j->...", cells, a, b)
-            for a, b in ((across, along), (across, along_rate), (across_rate, along))
-        )
-        return WallPlace(growth, slope * (m / (2 * np.pi)), turning * (m / (2 * np.pi)))
+        return wall_at(self.table[pin], direction, rotation)
 
     def gradients(self, linkage: Linkage, q: Array, gaps: Array, clearances: Array) -> tuple[Array, Array]:
         """Return depths (..., p) and their gradients by the gaps (..., p, 2), in the axes of the ground.
@@ -166,6 +164,20 @@ class WornWalls:
         return np.asarray((low + high) / 2)
 
 
+def wall_at(table: Array, direction: Array, rotation: Array) -> WallPlace:
+    """Return what the table (m + 3, m + 3) of a pin has in directions (...) at rotations (...) [rad]."""
+    m = len(table) - 3
+    column, along, along_rate = _spline_weights(direction * (m / (2 * np.pi)), m)
+    row, across, across_rate = _spline_weights(rotation * (m / (2 * np.pi)), m)
+    row, column = np.broadcast_arrays(row, column)
+    cells = table[row[..., None, None] + np.arange(4)[:, None], column[..., None, None] + np.arange(4)]
+    growth, slope, turning = (
+        np.einsum("...ij,...i,...j->...", cells, a, b)
+        for a, b in ((across, along), (across, along_rate), (across_rate, along))
+    )
+    return WallPlace(growth, slope * (m / (2 * np.pi)), turning * (m / (2 * np.pi)))
+
+
 def pin_directions(linkage: Linkage, q: Array) -> PinDirections:
     """Return the angles of the bodies at the pins of a linkage at coordinates (..., n)."""
     columns = [q[..., i] for i in range(q.shape[-1])]
@@ -178,22 +190,30 @@ def pin_directions(linkage: Linkage, q: Array) -> PinDirections:
     return PinDirections(bearing, rotation)
 
 
+def _resampled(profile: Array) -> Array:
+    """Return a profile in the directions of the table."""
+    n = len(profile)
+    return np.interp(np.arange(_CELLS) * (n / _CELLS), np.arange(n + 1), np.append(profile, profile[0]))
+
+
 def _growth(clearance: float, bearing: Array, journal: Array) -> Array:
     """Return (m, m) growth of the wall of a pin by rotation and direction [m]."""
     m = len(bearing)
     turned = (np.arange(m) - np.arange(m)[:, None]) % m
-    gone = bearing + journal[turned]
+    gone = clearance + (bearing + journal[turned])
     farthest = int(_BESIDE * m / (2 * np.pi))
-    wall = clearance + gone
+    around, wall = np.pad(gone, ((0, 0), (farthest, farthest)), mode="wrap"), gone.copy()
     for k in range(1, farthest + 1):
-        lengthened = (clearance + gone) / np.cos(k * 2 * np.pi / m)
-        np.minimum(wall, np.roll(lengthened, k, axis=-1), out=wall)
-        np.minimum(wall, np.roll(lengthened, -k, axis=-1), out=wall)
+        longer = 1 / np.cos(k * 2 * np.pi / m)
+        for first in (farthest - k, farthest + k):
+            np.minimum(wall, longer * around[:, first : first + m], out=wall)
     return np.asarray(wall - clearance)
 
 
 def _spline_weights(place: Array, m: int) -> tuple[Array, Array, Array]:
     """Return the first of the four cells (...) at a place in cells, and weights and their rates (..., 4)."""
+    # What has diverged has no place.
+    place = np.where(np.abs(place) < _FARTHEST, place, 0.0)
     first = np.floor(place)
     t = place - first
     u = 1 - t
