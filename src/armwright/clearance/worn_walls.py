@@ -98,6 +98,10 @@ class WornWalls:
             smoothing=np.abs(changes).max(axis=(1, 2)),
         )
 
+    def largest(self, pin: int) -> float:
+        """Return how much farther than its clearance the journal of a pin can go at most [m]."""
+        return float(self.table[pin].max())
+
     def at(self, pin: int, direction: Array, rotation: Array) -> WallPlace:
         """Return the wall of a pin in directions (...) at rotations of its journal (...) [rad]."""
         return wall_at(self.table[pin], direction, rotation)
