@@ -101,7 +101,7 @@ class ClearanceRun:
 
     @property
     def warnings(self) -> list[str]:
-        """Those of the notes that a reader must not overlook: not that pins are worn, or a run predictable to its end."""
+        """Those of the notes that a reader must not overlook: but for asked-for wear and the certainty of a run."""
         certain = self.predictability is not None and self.predictability.to_the_end
         harmless = [*_wear_notes(self), *(_predictability_notes(self) if certain else ())]
         return [note for note in self.notes if note not in harmless]

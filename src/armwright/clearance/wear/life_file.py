@@ -60,10 +60,10 @@ def read_worn_surfaces(path: Path, linkage: Linkage, strokes: float | None = Non
         known = floats(data["strokes"], "strokes")
         clearances = {str(name): float(c) for name, c in data["clearances"].items()}
         sides = [np.stack([floats(data[side][name], side) for name in clearances]) for side in ("bearing", "journal")]
-        shapes = {side.shape for side in sides}
-        ((pins, states, bins),) = shapes
+        _, states, bins = sides[0].shape
         sound = (
-            (states,) == known.shape
+            sides[0].shape == sides[1].shape
+            and (states,) == known.shape
             and np.all(np.diff(known) > 0)
             and all(np.all((side >= 0) & (side <= _DEEPEST)) for side in sides)
             and FEWEST_BINS <= bins <= MOST_BINS
