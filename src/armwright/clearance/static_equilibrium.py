@@ -2,7 +2,7 @@
 
 Without friction the force in each pin acts through the centres of bearing and journal. So a journal is displaced in the
 direction of the force that it carries, and indents the wall as that force requires; direction and geometry depend a
-little on each other, and a few iterations find both.
+little on each other, and a few iterations find both. On a worn wall it lies where the wall is normal to the force.
 
 Source:
     Spec of the clearance, 0.1 and 4.3.
@@ -16,6 +16,7 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import close_pins, inverse_dynamics, pin_gaps, tip_position
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.worn_walls import WornWalls
 from armwright.errors import InvalidValueError
 
 _MAX_ITERATIONS = 60
@@ -45,7 +46,11 @@ class StaticEquilibrium:
 
 
 def find_static_equilibrium(
-    linkage: Linkage, ideal: ArrayLike, clearances: ArrayLike | None = None, stiffness: ArrayLike | None = None
+    linkage: Linkage,
+    ideal: ArrayLike,
+    clearances: ArrayLike | None = None,
+    stiffness: ArrayLike | None = None,
+    worn: WornWalls | None = None,
 ) -> StaticEquilibrium:
     """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
 
@@ -54,6 +59,7 @@ def find_static_equilibrium(
         ideal: (..., n) coordinates with closed pins, at which the drives are locked.
         clearances: (..., p) [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5]; rigid ones when left out.
+        worn: walls of pins of these clearances, where they are worn.
 
     Raises:
         InvalidValueError: a pin carries no force, so that its journal may lie anywhere, or the linkage is singular.
@@ -72,7 +78,10 @@ def find_static_equilibrium(
     for _ in range(_MAX_ITERATIONS):
         _, reactions = inverse_dynamics(linkage, q, still, still)
         size = force_magnitudes(linkage, reactions)
-        gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
+        if worn is None:
+            gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
+        else:
+            gaps = worn.resting_gaps(linkage, q, reactions, c, K)
         new = close_pins(linkage, q, drives=drives, gaps=gaps)
         moved = np.abs(new - q).max(axis=-1, keepdims=True)
         q = np.where(converged, q, new)
