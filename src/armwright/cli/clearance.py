@@ -4,6 +4,7 @@ from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
+from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_tolerance import tolerance
@@ -19,6 +20,7 @@ clearance.command("wear")(wear)
 clearance.command("compare")(compare)
 clearance.command("export")(export)
 clearance.command("tolerance")(tolerance)
+clearance.command("reliability")(reliability)
 
 
 @clearance.callback()

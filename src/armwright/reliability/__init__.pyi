@@ -19,10 +19,19 @@ from .first_order import (
 )
 from .life_file import LifeFile as LifeFile, PlayGrowth as PlayGrowth, read_life_file as read_life_file
 from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
+from .linkage_assessment import (
+    LinkageReliability as LinkageReliability,
+    WearStatement as WearStatement,
+    assess_linkage as assess_linkage,
+    rest_poses as rest_poses,
+)
+from .linkage_errors import RandomClearances as RandomClearances, RandomLinkage as RandomLinkage
+from .linkage_life import LinkageLife as LinkageLife
 from .linkage_tolerances import (
     LinkageTolerances as LinkageTolerances,
     read_linkage_tolerances as read_linkage_tolerances,
 )
+from .linkage_wear import GapGrowth as GapGrowth, WearingLinkage as WearingLinkage
 from .play_life import (
     PlayLife as PlayLife,
     WearRates as WearRates,
@@ -46,5 +55,11 @@ from .tolerances import (
     read_tolerances as read_tolerances,
     sampled_deviations as sampled_deviations,
 )
+from .wear_measurements import (
+    WearMeasurement as WearMeasurement,
+    measured_residuals as measured_residuals,
+    read_wear_measurements as read_wear_measurements,
+)
 from .wear_update import RatePosterior as RatePosterior, updated_rate as updated_rate
+from .weighted_draws import WeightedDraws as WeightedDraws, draw as draw
 from .worst_case import longest_sum as longest_sum

@@ -236,6 +236,13 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
         ContradictionError: the measurement contradicts the model.
         TooFewError: a clearance is not identifiable.
     """
+    mean, covariance = read_estimate_moments(path, linkage)
+    draws = np.random.default_rng(0).multivariate_normal(mean, covariance, count)
+    return np.maximum(draws, _MIN_CLEARANCE)
+
+
+def read_estimate_moments(path: Path, linkage: Linkage) -> tuple[Array, Array]:
+    """Return mean (p,) [m] and covariance (p, p) [m²] of the clearances of an estimate; see ``read_estimate``."""
     text = read_text(path)
     try:
         data = json.loads(text)
@@ -248,7 +255,8 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
         if not (np.abs([mean, deviation]) <= _MAX_VALUE).all():
             raise ValueError  # noqa: TRY301 - turned into a FileFormatError below
         covariance = correlation * np.outer(deviation, deviation)
-        draws = np.random.default_rng(0).multivariate_normal(mean, covariance, count, check_valid="raise")[:, columns]
+        # It is one if numbers can be drawn by it.
+        np.random.default_rng(0).multivariate_normal(mean, covariance, 1, check_valid="raise")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError, np.linalg.LinAlgError) as error:
         text = f"expected the output of `armwright clearance estimate --json` for {linkage.name}"
         raise FileFormatError(path, None, "", text) from error
@@ -259,7 +267,7 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
             f"{path}: the measurement does not identify {', '.join(unknown)}; a path cannot be corrected for an "
             f"unknown clearance: measure more poses or paths, or give --clearance"
         )
-    return np.maximum(draws, _MIN_CLEARANCE)
+    return mean[columns], covariance[np.ix_(columns, columns)]
 
 
 def _parameters(fit: Estimate | Posterior, mean: Array, identifiable: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
