@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, leading_axes
+from armwright.arrays import Array, ArrayLike, floats, leading_axes, of_shape
 from armwright.clearance.contact import damping
 from armwright.clearance.equations import WORKS
 from armwright.clearance.ideal import pin_gaps, tip_position
@@ -104,6 +104,7 @@ def simulate(
     clearances: ArrayLike | None = None,
     *,
     frictions: ArrayLike | None = None,
+    initial: tuple[ArrayLike, ArrayLike] | None = None,
     threads: int | None = None,
 ) -> Simulation:
     """Simulate a linkage with clearance, driven as one without would be for its path.
@@ -112,6 +113,7 @@ def simulate(
         scenario: the prepared path; see ``prepare``.
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
+        initial: (..., n) coordinates and speeds from which the runs start; when left out, those of the settings.
         threads: how many cores to use; all when left out. The bits do not depend on it.
 
     Raises:
@@ -125,8 +127,9 @@ def simulate(
     check_step(linkage, settings, K)
     layout = Layout(linkage=linkage, friction=settings.friction, control=settings.control, located=settings.located)
     start = np.zeros((*lead, layout.states))
-    start[..., : layout.n] = initial_coordinates(scenario, c, K)
-    start[..., layout.n : 2 * layout.n] = scenario.ideal.qd[0]
+    q, qd = (initial_coordinates(scenario, c, K), scenario.ideal.qd[0]) if initial is None else initial
+    start[..., : layout.n] = of_shape(q, (layout.n,), "initial coordinates")
+    start[..., layout.n : 2 * layout.n] = of_shape(qd, (layout.n,), "initial speeds")
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)

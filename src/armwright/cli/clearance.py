@@ -6,6 +6,7 @@ from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
+from armwright.cli.clearance_vibration import vibration
 from armwright.cli.clearance_wear import wear
 from armwright.cli.commands import App, Group
 
@@ -17,6 +18,7 @@ clearance.command("correct")(correct)
 clearance.command("wear")(wear)
 clearance.command("compare")(compare)
 clearance.command("export")(export)
+clearance.command("vibration")(vibration)
 
 
 @clearance.callback()
