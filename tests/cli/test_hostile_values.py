@@ -73,6 +73,7 @@ CALLS: dict[str, list[str]] = {
     "clearance estimate": ["five-bar", "rest.csv", "--json"],
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],
     "clearance wear": ["five-bar", "--path", "x1", "--k", "1e-5", "--steps", "1", "--json"],
+    "clearance vibration": ["four-bar", "--speed-rpm", "6000", "--json"],
     "clearance compare": ["five-bar", "five-bar", "--cells", "3", "--json"],
     "clearance export": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "-o", "out"],
     "clearance reliability": ["five-bar", "--at", "0,-575", "--limit", "0.6", "--samples", "20", "--json"],

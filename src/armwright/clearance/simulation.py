@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, leading_axes
+from armwright.arrays import Array, ArrayLike, floats, leading_axes, of_shape
 from armwright.clearance.contact import damping
 from armwright.clearance.equations import WORKS
 from armwright.clearance.ideal import pin_gaps, tip_position
@@ -120,6 +120,7 @@ def simulate(
     clearances: ArrayLike | None = None,
     *,
     frictions: ArrayLike | None = None,
+    initial: tuple[ArrayLike, ArrayLike] | None = None,
     threads: int | None = None,
     worn: WornWalls | None = None,
 ) -> Simulation:
@@ -129,6 +130,7 @@ def simulate(
         scenario: the prepared path; see ``prepare``.
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
+        initial: (..., n) coordinates and speeds from which the runs start; when left out, those of the settings.
         threads: how many cores to use; all when left out. The bits do not depend on it.
         worn: walls of pins of these clearances, where they are worn.
 
@@ -149,8 +151,9 @@ def simulate(
         worn=worn is not None,
     )
     start = np.zeros((*lead, layout.states))
-    start[..., : layout.n] = initial_coordinates(scenario, c, K, worn)
-    start[..., layout.n : 2 * layout.n] = scenario.ideal.qd[0]
+    q, qd = (initial_coordinates(scenario, c, K, worn), scenario.ideal.qd[0]) if initial is None else initial
+    start[..., : layout.n] = of_shape(q, (layout.n,), "initial coordinates")
+    start[..., layout.n : 2 * layout.n] = of_shape(qd, (layout.n,), "initial speeds")
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)

@@ -8,6 +8,7 @@ from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_tolerance import tolerance
+from armwright.cli.clearance_vibration import vibration
 from armwright.cli.clearance_wear import wear
 from armwright.cli.commands import App, Group
 
@@ -21,6 +22,7 @@ clearance.command("compare")(compare)
 clearance.command("export")(export)
 clearance.command("tolerance")(tolerance)
 clearance.command("reliability")(reliability)
+clearance.command("vibration")(vibration)
 
 
 @clearance.callback()
