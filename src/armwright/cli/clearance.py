@@ -27,7 +27,7 @@ clearance.command("vibration")(vibration)
 
 @clearance.callback()
 def group() -> None:
-    """Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.
+    """Simulate, estimate, correct and compare linkages with clearance in their pins; how long they stay accurate.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """

@@ -17,9 +17,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from armwright.arrays import Array, ArrayLike, floats, not_negative, read_only
+from armwright.clearance.dimensions import dimensions_of
 from armwright.clearance.ideal import tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.sensitivities import dimensions_of, rest_sensitivities
+from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
