@@ -146,7 +146,10 @@ class LinearError:
             rows = min(block, count - first)
             z = rng.normal(size=(rows, L.shape[-1])) + centres[rng.choice(len(parts), rows, p=parts)]
             failed = (np.square(self.errors(z)).sum(axis=-1) > limit**2).any(axis=-1)
-            weights = 1 / (np.exp(z[failed] @ centres.T - halves) @ parts)
+            # The first centre is the nominal one, so that the largest exponent is 0 or more, and nothing overflows.
+            exponents = z[failed] @ centres.T - halves
+            top = exponents.max(axis=1, initial=0.0)
+            weights = np.exp(-top) / (np.exp(exponents - top[:, None]) @ parts)
             total, squares = total + float(weights.sum()), squares + float((weights**2).sum())
         mean = total / count
         return Estimate(mean, float(np.sqrt(max(squares / count - mean**2, 0.0) / count)), count)
