@@ -23,6 +23,9 @@ from armwright.clearance.wear.worn_surfaces import WearLaw
 from armwright.clearance.worn_walls import WornWalls
 from clearance.mechanisms import GRAVITY, left_alone, still, thrown
 
+# Slow: a half of its tests is drawn.
+pytestmark = pytest.mark.part(0.5)
+
 CLEARANCE, DEPTH = 5e-4, 2e-5
 ANGLES = np.arange(360) * (2 * np.pi / 360)
 NOTHING = np.zeros((1, 360))
@@ -116,7 +119,6 @@ def test_first_wave_is_a_shifted_circle() -> None:
     assert apart < 0.5 * shift**2 / (2 * CLEARANCE)
 
 
-@pytest.mark.drawn(0.5)
 @pytest.mark.parametrize("turned", [False, True])
 def test_elastic_blows_keep_the_energy(*, turned: bool) -> None:
     """On a worn wall, without friction and loss, no energy goes; it passes between the spin and the blows."""

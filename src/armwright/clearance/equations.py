@@ -176,11 +176,10 @@ def rates(
     placement = Placement(linkage, state.q, state.qd)
     force = free_forces(placement)
     pins, impact_loss, friction_loss, stored = [], 0.0, 0.0, 0.0
-    unworn = [None] * len(linkage.pins)
-    for *parameters, worn in zip(linkage.pins, contacts, state.memories, walls or unworn, strict=True):
-        pin = _pin_contact(placement, friction, *parameters, worn=worn)
-        for i, push in pin.forces.items():
-            force[i] = force[i] + push
+    for i, parameters in enumerate(zip(linkage.pins, contacts, state.memories, strict=True)):
+        pin = _pin_contact(placement, friction, *parameters, worn=walls[i] if walls else None)
+        for k, push in pin.forces.items():
+            force[k] = force[k] + push
         pins.append(pin)
         impact_loss = impact_loss + pin.losses[0]
         friction_loss = friction_loss + pin.losses[1]

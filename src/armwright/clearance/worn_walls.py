@@ -88,7 +88,7 @@ class WornWalls:
         bearing, journal = (np.stack([_resampled(profile) for profile in side]) for side in (bearing, journal))
         growths = np.stack([_growth(*of_pin) for of_pin in zip(clearances, bearing, journal, strict=True)])
         table = np.pad(growths, ((0, 0), (1, 2), (1, 2)), mode="wrap")
-        angles = np.arange(_CELLS) * (2 * np.pi / _CELLS)
+        angles: Array = np.linspace(0.0, 2 * np.pi, _CELLS, endpoint=False)
         changes = [
             wall_at(one, angles[None], angles[:, None]).growth - g for one, g in zip(table, growths, strict=True)
         ]
@@ -197,7 +197,8 @@ def pin_directions(linkage: Linkage, q: Array) -> PinDirections:
 def _resampled(profile: Array) -> Array:
     """Return a profile in the directions of the table."""
     n = len(profile)
-    return np.interp(np.arange(_CELLS) * (n / _CELLS), np.arange(n + 1), np.append(profile, profile[0]))
+    places = np.arange(_CELLS) * (n / _CELLS)
+    return np.asarray(np.interp(places, np.arange(n + 1), np.append(profile, profile[0])))
 
 
 def _growth(clearance: float, bearing: Array, journal: Array) -> Array:

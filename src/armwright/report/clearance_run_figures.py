@@ -130,7 +130,7 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
         clearance = wall = float(run.simulation.clearances[i]) * 1e3
         axis.add_patch(Circle((0, 0), wall, fill=False, color="k", linewidth=1.2))
         if run.simulation.worn is not None:
-            for outline, style in zip(wall_outlines(run, i, samples[[0, -1]]) * 1e3, "-:", strict=True):
+            for outline, style in zip(wall_outlines(run, i, np.array([0, run.rows - 1])) * 1e3, "-:", strict=True):
                 axis.plot(*np.vstack([outline, outline[:1]]).T, style, color="C3", linewidth=1.0)
                 wall = max(wall, float(np.linalg.norm(outline, axis=-1).max()))
         lines = LineCollection([gaps[segment] for segment in segments], array=factor, cmap="viridis", linewidths=1.0)
