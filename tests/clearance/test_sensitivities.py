@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
+from armwright.clearance.dimensions import deviate, dimensions_of
 from armwright.clearance.estimation.static_estimate import closed_at_poses, rest_matrix
 from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Load, Pin
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import assembly_guess
-from armwright.clearance.sensitivities import dimensions_of, rest_sensitivities
+from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, UnknownNameError
@@ -198,6 +199,7 @@ LINKAGES = {
 }
 
 
+@pytest.mark.drawn(0.5)
 @pytest.mark.parametrize("name", LINKAGES)
 def test_differences_of_equilibria(name: str, sample: Sample) -> None:
     """Every column of random linkages, with rigid and with soft walls, is the slope of full equilibria."""
@@ -263,3 +265,20 @@ def test_refusals(linkage: Linkage) -> None:
         rest_sensitivities(linkage, q).column("link2.lenght")
     with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
         rest_sensitivities(attrs.evolve(linkage, gravity=(0.0, 0.0), loads=()), q)
+
+
+def test_deviations(sample: Sample) -> None:
+    """A linkage of which every dimension deviates by a little rests where the derivatives say."""
+    linkage = slotted_lever()
+    start = assembly_guess(linkage)
+    q = close_pins(linkage, start, drives=start[list(linkage.driven)])
+    rest = rest_sensitivities(linkage, q)
+    for rng in sample.cases(20):
+        by = rng.normal(scale=1e-7, size=len(rest.names))
+
+        other, shifts = deviate(linkage, dict(zip(rest.names, by, strict=True)))
+
+        tip = resting_tip(other, q, q[list(linkage.driven)] + shifts, None)
+        np.testing.assert_allclose(tip - rest.tip, rest.jacobian @ by, rtol=0, atol=2e-12)
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'P\.clearance'"):
+        deviate(linkage, {"P.clearence": 1e-6})

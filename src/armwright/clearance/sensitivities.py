@@ -12,39 +12,28 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Iterator
 
 import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.dimensions import (
+    Change,
+    Dimension,
+    DimensionKind,
+    dimensions_of,
+    guide_changes,
+    length_changes,
+    point_changes,
+    zero_shifts,
+)
 from armwright.clearance.equations import drive_weights
 from armwright.clearance.ideal import inverse_dynamics
-from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage
+from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement, Point, Vec2
 from armwright.clearance.static_equilibrium import find_static_equilibrium, force_magnitudes
 from armwright.errors import InvalidValueError, one_of
-
-DimensionKind: TypeAlias = Literal["clearance", "length", "zero", "tool", "point", "guide", "mass", "load"]
-
-# Points that are nearer to one another are one [m].
-_SAME_PLACE = 1e-9
-
-
-class Dimension(NamedTuple):
-    """A number that describes a linkage and may be a little other than it should.
-
-    Attributes:
-        name: such as ``J2.clearance``, ``link1.length``, ``link1.zero``, ``tool.along``, ``link1:J2.across``,
-            ``ground:J1.x``, ``ram.direction``, ``link1.mass``, ``load1.y``.
-        kind: what it is.
-        unit: of it: ``m``, ``rad``, ``kg`` or ``N``.
-    """
-
-    name: str
-    kind: DimensionKind
-    unit: Literal["m", "rad", "kg", "N"]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -77,31 +66,6 @@ class RestSensitivities:
             UnknownNameError: there is none of that name; the nearest is named.
         """
         return self.jacobian[..., self.names.index(one_of("dimension", name, self.names))]
-
-
-class _Change(NamedTuple):
-    """A dimension of the geometry, with the linkage after a step of 1 m, or of a right angle, to either side."""
-
-    dimension: Dimension
-    changed: Callable[[float], Linkage]
-
-
-def dimensions_of(linkage: Linkage) -> tuple[Dimension, ...]:
-    """Return all dimensions of a linkage, in the order of the columns of ``rest_sensitivities``.
-
-    These are the clearance of each pin; the length of each body that has two joint points, which is their distance;
-    the zero of each drive; the place of the tool, along and across the axis of its body; each coordinate of each point
-    that a joint or pin uses; direction and angle of each guide; the masses; and both components of each load.
-    """
-    return (
-        *(Dimension(f"{pin.name}.clearance", "clearance", "m") for pin in linkage.pins),
-        *(change.dimension for change in _lengths(linkage)),
-        *_zeros(linkage),
-        *(Dimension(f"tool.{way}", "tool", "m") for way in ("along", "across")),
-        *(change.dimension for change in (*_points(linkage), *_guides(linkage))),
-        *(Dimension(f"{body.name}.mass", "mass", "kg") for body in linkage.bodies),
-        *(Dimension(f"load{i}.{axis}", "load", "N") for i, _ in enumerate(linkage.loads, 1) for axis in "xy"),
-    )
 
 
 def rest_sensitivities(
@@ -241,15 +205,15 @@ def _right_sides(linkage: Linkage, q: Array, reactions: Array, directions: Array
 
     for k in range(p):
         new()[0][..., n + 2 * k : n + 2 * k + 2] = -directions[..., k, :]
-    changes = [_geometry_slope(change, q, reactions) for change in _lengths(linkage)]
-    columns += changes
-    for shift in _zero_shifts(linkage).T:
+    columns += [_geometry_slope(linkage, change, q, reactions) for change in length_changes(linkage)]
+    for shift in zero_shifts(linkage).T:
         new()[0][..., n + 2 * p :] = -shift
     axis = placement.frames[linkage.tip.body].axis
     for way in (axis, axis.perpendicular()):
         _, own = new()
         own[..., 0], own[..., 1] = way
-    columns += [_geometry_slope(change, q, reactions) for change in (*_points(linkage), *_guides(linkage))]
+    changes = (*point_changes(linkage), *guide_changes(linkage))
+    columns += [_geometry_slope(linkage, change, q, reactions) for change in changes]
     gravity = Vec2(*map(float, linkage.gravity))
     pushes = [(placement.centre(body), gravity) for body in linkage.bodies]
     pushes += [(placement.point(load.point), Vec2(*way)) for load in linkage.loads for way in np.eye(2).tolist()]
@@ -260,9 +224,9 @@ def _right_sides(linkage: Linkage, q: Array, reactions: Array, directions: Array
     return np.stack([each[0] for each in columns], axis=-1), np.stack([each[1] for each in columns], axis=-1)
 
 
-def _geometry_slope(change: _Change, q: Array, reactions: Array) -> tuple[Array, Array]:
+def _geometry_slope(linkage: Linkage, change: Change, q: Array, reactions: Array) -> tuple[Array, Array]:
     """Return the derivatives of the equations (..., m) and of the tip (..., 2) by a dimension of the geometry."""
-    after, before = (_geometry(change.changed(side), q, reactions) for side in (1.0, -1.0))
+    after, before = (_geometry(change.apply(linkage, by), q, reactions) for by in (change.step, -change.step))
     slopes = (after - before) / 2
     return slopes[..., :-2], slopes[..., -2:]
 
@@ -280,90 +244,3 @@ def _geometry(linkage: Linkage, q: Array, reactions: Array) -> Array:
         values[..., n + 2 * k], values[..., n + 2 * k + 1] = gap
     values[..., -2], values[..., -1] = placement.point(linkage.tip).position
     return values
-
-
-# ---- dimensions ----------------------------------------------------------------------------------------------------
-
-
-def _joint_points(linkage: Linkage) -> list[BodyPoint]:
-    """Return the points that joints and pins use, body by body, that by which a body is carried first."""
-    carried = [BodyPoint(joint.body, joint.point) for joint in linkage.joints]
-    ends = {
-        *(joint.on for joint in linkage.joints),
-        *(end for pin in linkage.pins for end in (pin.bearing, pin.journal)),
-    }
-    bodies = [GROUND, *(body.name for body in linkage.bodies)]
-    every = [BodyPoint(name, point) for name in bodies for point in linkage.body(name).points]
-    used = [point for point in every if point in ends or point in carried]
-    return sorted(used, key=lambda point: (bodies.index(point.body), point not in carried))
-
-
-def _lengths(linkage: Linkage) -> Iterator[_Change]:
-    points = _joint_points(linkage)
-    for body in linkage.bodies:
-        own = [body.points[point.point] for point in points if point.body == body.name]
-        places = [x for i, x in enumerate(own) if all(np.linalg.norm(x - other) > _SAME_PLACE for other in own[:i])]
-        if len(places) == 2:
-            way = (places[1] - places[0]) / np.linalg.norm(places[1] - places[0])
-            dimension = Dimension(f"{body.name}.length", "length", "m")
-            yield _Change(dimension, _mover(linkage, body, places[1], way))
-
-
-def _points(linkage: Linkage) -> Iterator[_Change]:
-    for point in _joint_points(linkage):
-        body = linkage.body(point.body)
-        for name, way in zip("xy" if point.body == GROUND else ("along", "across"), np.eye(2), strict=True):
-            dimension = Dimension(f"{point}.{name}", "point", "m")
-            yield _Change(dimension, _mover(linkage, body, linkage.point(point), way))
-
-
-def _mover(linkage: Linkage, body: Body, place: Array, way: Array) -> Callable[[float], Linkage]:
-    """Return what moves the points of a body at one place by a distance [m]."""
-
-    def moved(distance: float) -> Linkage:
-        points = {
-            name: x + distance * way if np.linalg.norm(x - place) <= _SAME_PLACE else x
-            for name, x in body.points.items()
-        }
-        new = attrs.evolve(body, points=points)
-        if body is linkage.ground:
-            return attrs.evolve(linkage, ground=new)
-        return attrs.evolve(linkage, bodies=[new if each is body else each for each in linkage.bodies])
-
-    return moved
-
-
-def _guides(linkage: Linkage) -> Iterator[_Change]:
-    for joint in linkage.joints:
-        if isinstance(joint, Guide):
-            for field in ("direction", "angle"):
-                dimension = Dimension(f"{joint.body}.{field}", "guide", "rad")
-                yield _Change(dimension, _turner(linkage, joint, field))
-
-
-def _turner(linkage: Linkage, guide: Guide, field: str) -> Callable[[float], Linkage]:
-    """Return what turns the direction or angle of a guide by a number of right angles."""
-
-    def turned(sides: float) -> Linkage:
-        new = attrs.evolve(guide, **{field: getattr(guide, field) + sides * np.pi / 2})
-        return attrs.evolve(linkage, joints=[new if each is guide else each for each in linkage.joints])
-
-    return turned
-
-
-def _zeros(linkage: Linkage) -> Iterator[Dimension]:
-    for drive, number in zip(linkage.drives, linkage.driven, strict=True):
-        unit: Literal["rad", "m"] = "rad" if linkage.coordinates[number].kind == "angle" else "m"
-        yield Dimension(f"{drive.body}.zero", "zero", unit)
-
-
-def _zero_shifts(linkage: Linkage) -> Array:
-    """Return (d, d) the shifts of the driven coordinates by the zeros of the drives.
-
-    The zero of a drive is against the body that carries it: a driven carrier passes its own on.
-    """
-    weights = np.zeros((len(linkage.drives), len(linkage.coordinates)))
-    for k, drive in enumerate(linkage.drives):
-        for i, weight in drive_weights(linkage, drive.body).items():
-            weights[k, i] = weight
-    return np.asarray(np.linalg.inv(weights[:, list(linkage.driven)]), dtype=np.float64)

@@ -7,6 +7,7 @@ from armwright.cli.clearance_export import export
 from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
+from armwright.cli.clearance_tolerance import tolerance
 from armwright.cli.clearance_wear import wear
 from armwright.cli.commands import App, Group
 
@@ -18,6 +19,7 @@ clearance.command("correct")(correct)
 clearance.command("wear")(wear)
 clearance.command("compare")(compare)
 clearance.command("export")(export)
+clearance.command("tolerance")(tolerance)
 clearance.command("reliability")(reliability)
 
 

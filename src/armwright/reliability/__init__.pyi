@@ -1,6 +1,6 @@
 from .allocation import Allocation as Allocation, allocate as allocate, error_bounds as error_bounds
 from .arm_errors import (
-    sampled_deviations as sampled_deviations,
+    assess_tolerances as assess_tolerances,
     sampled_errors as sampled_errors,
     tool_error as tool_error,
 )
@@ -10,7 +10,7 @@ from .arm_life import (
     RepeatedMotion as RepeatedMotion,
     assess_life as assess_life,
 )
-from .assessment import ToleranceAssessment as ToleranceAssessment, assess_tolerances as assess_tolerances
+from .assessment import Mechanism as Mechanism, ToleranceAssessment as ToleranceAssessment
 from .exceedance import exceedance as exceedance
 from .first_order import (
     form as form,
@@ -27,6 +27,10 @@ from .linkage_assessment import (
 )
 from .linkage_errors import RandomClearances as RandomClearances, RandomLinkage as RandomLinkage
 from .linkage_life import LinkageLife as LinkageLife
+from .linkage_tolerances import (
+    LinkageTolerances as LinkageTolerances,
+    read_linkage_tolerances as read_linkage_tolerances,
+)
 from .linkage_wear import GapGrowth as GapGrowth, WearingLinkage as WearingLinkage
 from .play_life import (
     PlayLife as PlayLife,
@@ -41,7 +45,16 @@ from .reducer_life import (
     life_hours as life_hours,
     load_of as load_of,
 )
-from .tolerances import Tolerance as Tolerance, dimensions as dimensions, read_tolerances as read_tolerances
+from .tip_errors import (
+    assess_linkage_tolerances as assess_linkage_tolerances,
+    sampled_tip_errors as sampled_tip_errors,
+)
+from .tolerances import (
+    Tolerance as Tolerance,
+    dimensions as dimensions,
+    read_tolerances as read_tolerances,
+    sampled_deviations as sampled_deviations,
+)
 from .wear_measurements import (
     WearMeasurement as WearMeasurement,
     measured_residuals as measured_residuals,
