@@ -7,7 +7,7 @@ import pytest
 
 from cli_calls import armwright, check_mistake
 
-AT = ("five-bar", "--at", "-180,-600", "--samples", "20")
+AT = ("five-bar", "--pose", "-180,-600", "--samples", "20")
 SMALL = ("four-bar", "--speed-rpm", "600", "--poses", "3", "--samples", "20")
 
 
@@ -54,7 +54,7 @@ def test_life_of_the_four_bar(tmp_path: Path) -> None:
         ((*AT, "--limit", "0.6", "--estimate", "none.json"), "none.json"),
         ((*AT, "--limit", "0"), "limit: expected more than 0"),
         ((*SMALL, "--k", "1e-5"), "a life needs a limit"),
-        (("five-bar", "--at", "0,9000", "--limit", "1"), "cannot be followed"),
+        (("five-bar", "--pose", "0,9000", "--limit", "1"), "cannot be followed"),
     ],
 )
 def test_what_is_wrong(options: tuple[str, ...], message: str, tmp_path: Path) -> None:

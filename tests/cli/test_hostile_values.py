@@ -76,7 +76,7 @@ CALLS: dict[str, list[str]] = {
     "clearance vibration": ["four-bar", "--speed-rpm", "6000", "--json"],
     "clearance compare": ["five-bar", "five-bar", "--cells", "3", "--json"],
     "clearance export": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "-o", "out"],
-    "clearance reliability": ["five-bar", "--at", "0,-575", "--limit", "0.6", "--samples", "20", "--json"],
+    "clearance reliability": ["five-bar", "--pose", "0,-575", "--limit", "0.6", "--samples", "20", "--json"],
     "tolerance": ["puma560", "tolerances.toml", "-q", Q, "--limit", "0.5", "--samples", "20", "--json"],
     "life": ["puma560", "efforts.csv", "life.toml", "--limit", "0.1", "--samples", "20", "--json"],
     "vibration": ["ur5", "-q", Q, "--stiffness", "1e4", "--json"],

@@ -88,14 +88,13 @@ def test_published_pose() -> None:
 def test_complete_equilibria(rng: np.random.Generator) -> None:
     """About the mean clearances the linear law differs from complete equilibria by little of the spread."""
     random = at_rest(Q1, (0.0, -0.575))
-    clearances = random.clearances.values(rng.normal(size=(50, 3)))
-    off = np.linalg.norm(random.equilibria(clearances) - random.errors(clearances, np.zeros((50, 0))), axis=-1)
-    assert off.max() < 1e-3 * DEVIATION
-    np.testing.assert_allclose(random.equilibria(MEAN[None])[0], random.offset, rtol=0, atol=1e-15)
+    z = rng.normal(size=(50, 3))
+    assert np.linalg.norm(random.equilibria(z) - random.drawn_errors(z), axis=-1).max() < 1e-3 * DEVIATION
+    np.testing.assert_allclose(random.equilibria(np.zeros((1, 3)))[0], random.offset, rtol=0, atol=1e-15)
 
 
-def test_lengths_and_zeros() -> None:
-    """Lengths and zeros of drives add their variances: the spread of a length is that of its derivative."""
+def test_lengths_and_zeros(rng: np.random.Generator) -> None:
+    """Lengths and zeros of drives add their variances, and move the tip as in complete equilibrium."""
     deviations = {"link2.length": 1e-5, "link4.zero": 2e-5}
     clearances = RandomClearances(mean=MEAN, covariance=np.zeros((3, 3)))
     q = closed_at_poses(five_bar(), [Q1])
@@ -104,6 +103,8 @@ def test_lengths_and_zeros() -> None:
     columns = np.stack([found.column(name)[0] * size for name, size in deviations.items()], axis=-1)
     np.testing.assert_allclose(random.error.covariance[0], columns @ columns.T, rtol=1e-12)
     np.testing.assert_allclose(random.shares[0], [0, 0, 0, *np.square(columns).sum(axis=0) / np.square(columns).sum()])
+    z = rng.normal(size=(5, 5))
+    np.testing.assert_allclose(random.equilibria(z), random.drawn_errors(z), rtol=0, atol=1e-8)
 
 
 def test_correlated_clearances(rng: np.random.Generator) -> None:
@@ -230,7 +231,7 @@ def test_a_million_equilibria(sample: Sample) -> None:
     random, count = at_rest(Q1), sample.count(1_000_000)
     limits = np.array([0.58, 0.60, 0.62]) * 1e-3
     z = np.random.default_rng(sample.seed).normal(size=(count, 3))
-    sizes = np.linalg.norm(random.equilibria(random.clearances.values(z))[:, 0], axis=-1)
+    sizes = np.linalg.norm(random.equilibria(z)[:, 0], axis=-1)
     exact = np.array([random.error.pose_probabilities(limit)[0] for limit in limits])
     found = (sizes[:, None] > limits).mean(axis=0)
     scores = np.abs(found - exact) / np.sqrt(exact * (1 - exact) / count)

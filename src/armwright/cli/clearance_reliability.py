@@ -19,21 +19,21 @@ if TYPE_CHECKING:
     from armwright.reliability.linkage_assessment import WearStatement
     from armwright.reliability.linkage_errors import RandomClearances
 
-# Lengths are in mm and angles in degrees where no unit is written.
-_UNITS = ("", "mm", "deg")
+# Units of deviations, of which one need not be written.
+_UNITS = ("", "mm", "deg", "kg", "N")
 
 
 def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     limit: Annotated[float | None, Option(help="Limit of the error of the tip at rest, in mm.")] = None,
-    at: Annotated[
+    pose: Annotated[
         list[str] | None,
         Option(help="Position of the tip in mm, as in -180,-600, or the drive in deg or mm; may be repeated."),
     ] = None,
     path: Annotated[
         str | None,
         Option(
-            help="Path whose poses count without --at, and of a stroke: x1 to x10, y1 to y14, pick-and-place.",
+            help="Path whose poses count without --pose, and of a stroke: x1 to x10, y1 to y14, pick-and-place.",
             autocompletion=paths,
         ),
     ] = None,
@@ -44,7 +44,10 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     sd: Annotated[
         list[str] | None,
-        Option("--sd", help="Standard deviation, as in J2=0.02 (mm), link2.length=0.01, link1.zero=0.01deg."),
+        Option(
+            "--sd",
+            help="Standard deviation, as in J2=0.02 (mm), link2.length=0.01, link1.zero=0.01deg, tool.along=0.1.",
+        ),
     ] = None,
     clearance_sd_mm: Annotated[
         float, Option("--clearance-sd-mm", help="Standard deviation of the clearances that --sd does not name, in mm.")
@@ -54,8 +57,13 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     lognormal: Annotated[bool, Option("--lognormal", help="Clearances are lognormal, and not normal.")] = False,
     samples: Annotated[
-        int, Option(min=2, max=1_000_000, help="Number of random linkages in complete equilibrium.")
-    ] = 2000,
+        int | None,
+        Option(
+            min=2,
+            max=1_000_000,
+            help="Number of random linkages in complete equilibrium; 2000, or 200 with more than clearances.",
+        ),
+    ] = None,
     seed: Annotated[int, Option(min=0, help="Seed of all samples.")] = 0,
     k: Annotated[
         float | None, Option("--k", help="Median wear coefficient in mm³/(N m); asks for the life. Needs a path.")
@@ -94,7 +102,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     which pin counts most. Measurements of the worn linkage (--measured) update both. With -o, report.html shows the
     curves with their bands.
 
-    **Example:** `armwright clearance reliability five-bar --at -180,-600 --clearance J2=0.328 --limit 0.9`
+    **Example:** `armwright clearance reliability five-bar --pose -180,-600 --clearance J2=0.328 --limit 0.9`
     """
     from armwright.clearance.reader import load_linkage
     from armwright.reliability.linkage_assessment import assess_linkage, rest_poses
@@ -107,9 +115,9 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--estimate", "give either --estimate or --clearance and --sd")
     named = named_numbers(sd or (), _UNITS, "a dimension and its deviation, J2=0.02 or link1.zero=0.01deg", "--sd")
     way = None if path is None and speed_rpm is None else path_of(model, path, speed_rpm, 1.0)
-    places = None if not at else [_place(model, text) for text in at]
+    places = None if not pose else [_place(model, text) for text in pose]
     if places is None and way is None:
-        raise usage_error("--at", "expected poses, as --at X,Y, or those of a path, --path")
+        raise usage_error("--pose", "expected poses, as --pose X,Y, or those of a path, --path")
     wear = None
     if k is not None:
         if way is None:
@@ -160,30 +168,29 @@ def _place(model: "Linkage", text: str) -> list[float]:
     import math
 
     count = len(model.drives)
-    values = numbers(text, count, "--at")
+    values = numbers(text, count, "--pose")
     if count == 1 and model.coordinates[model.driven[0]].kind == "angle":
         return [math.radians(values[0])]
     return [value * 1e-3 for value in values]
 
 
 def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:
-    """Return standard deviations of what is no clearance [m] or [rad].
+    """Return standard deviations of what is no clearance [m, rad, kg, N].
 
     Raises:
-        BadParameter: a length is in degrees.
+        BadParameter: the unit of one is wrong.
     """
-    import math
+    from armwright.clearance.dimensions import dimensions_of
+    from armwright.reliability.linkage_assessment import SHOWN
 
-    turning = {
-        f"{model.coordinates[number].body}.zero" for number in model.driven if model.coordinates[number].kind == "angle"
-    }
+    units = {dimension.name: dimension.unit for dimension in dimensions_of(model)}
     found = {}
     for name, number in named.items():
-        angle = name in turning
-        if number.unit and (number.unit == "deg") != angle:
-            raise usage_error("--sd", f"{name}: expected {'deg' if angle else 'mm'}, got {number.unit}")
+        scale, unit = SHOWN[units.get(name, "m")]
+        if number.unit not in {"", unit}:
+            raise usage_error("--sd", f"{name}: expected {unit}, got {number.unit}")
         if name not in model.clearances:
-            found[name] = math.radians(number.value) if angle else number.value * 1e-3
+            found[name] = number.value * scale
     return found
 
 

@@ -17,6 +17,7 @@ from .first_order import (
     nearest_failure as nearest_failure,
     reliability_index as reliability_index,
 )
+from .gamma_process import GammaProcess as GammaProcess, gamma_process as gamma_process
 from .life_file import LifeFile as LifeFile, PlayGrowth as PlayGrowth, read_life_file as read_life_file
 from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
 from .linkage_assessment import (

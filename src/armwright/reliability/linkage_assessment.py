@@ -6,6 +6,7 @@ Source:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -14,11 +15,12 @@ import attrs
 import numpy as np
 from scipy.special import chdtrc
 
-from armwright.arrays import Array, ArrayLike, floats, integer, not_negative, positive
-from armwright.clearance.estimation.static_estimate import closed_at_poses
-from armwright.clearance.ideal import close_pins, tip_position
+from armwright.arrays import Array, ArrayLike, integer, not_negative, positive
+from armwright.clearance.dimensions import DimensionUnit, dimensions_of
+from armwright.clearance.ideal import tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
+from armwright.clearance.poses import closed_at
 from armwright.clearance.scenario import assembly_guess, close_pins_along
 from armwright.clearance.wear.life import wear_life
 from armwright.clearance.wear.worn_stroke import Stroke, lean
@@ -32,6 +34,13 @@ from armwright.reliability.linkage_wear import GapGrowth, Measure, WearingLinkag
 from armwright.reliability.wear_measurements import WearMeasurement, measured_residuals
 from armwright.reliability.weighted_draws import draw
 
+# What a user writes for a unit, and its SI value.
+SHOWN: Mapping[DimensionUnit, tuple[float, str]] = {
+    "m": (1e-3, "mm"),
+    "rad": (math.radians(1), "deg"),
+    "kg": (1.0, "kg"),
+    "N": (1.0, "N"),
+}
 # The linear law is said to be off where its errors differ by more from those of the equilibrium, in parts of their
 # spread; or where the probabilities of both differ by more than this many of the standard errors of the sample.
 _LINEAR, _SIGNIFICANT = 0.02, 3.0
@@ -39,6 +48,8 @@ _LINEAR, _SIGNIFICANT = 0.02, 3.0
 _BELOW_ZERO = 1e-9
 # Equilibria of a sample at most, poses, and limits of the error [m].
 _MOST_EQUILIBRIA, _MOST_POSES, _LIMITS = 2_000_000, 1000, (1e-12, 1e3)
+# Random linkages whose clearances alone are random, and others.
+_SAMPLES = 2000, 200
 # A step of the worn walls takes at most this part of a clearance.
 _STEP = 0.04
 # Measurements contradict what was stated before where their residuals are so improbable.
@@ -122,7 +133,7 @@ class LinkageReliability:
         """How the numbers are meant, and what to doubt."""
         clearances = self.random.clearances
         poses = counted(len(self.labels), "pose")
-        others = ", lengths and zeros of drives normal" * bool(self.random.deviations)
+        others = ", other dimensions normal" * bool(self.random.deviations)
         notes = [f"The tip rests at {poses}; clearances are {clearances.shape}{others}; only RP has friction."]
         if clearances.below_zero > _BELOW_ZERO:
             notes.append(
@@ -145,8 +156,7 @@ class LinkageReliability:
     def _linearity_notes(self) -> Iterator[str]:
         yield (
             f"Errors of {self.samples} random linkages in complete equilibrium differ from the linear law by "
-            f"{self.nonlinearity:.2g} of their spread"
-            + ("; lengths and zeros are linear in both." if self.random.deviations else ".")
+            f"{self.nonlinearity:.2g} of their spread."
         )
         if self.nonlinearity > _LINEAR:
             yield "The linear law is off: trust the part of the sampled linkages, not the probabilities by the law."
@@ -157,7 +167,7 @@ class LinkageReliability:
                 yield f"Of them {full:.3g} are beyond the limit in equilibrium, {linear:.3g} by the linear law."
 
     def _life_notes(self, life: LinkageLife) -> Iterator[str]:
-        name = _measure_text(life.measure)
+        name = "RP" if life.measure == "RP" else "Error"
         surely = life.quantile(PARTS[0])
         if np.isfinite(surely):
             yield f"{name} within {life.limit * 1e3:g} mm with 95 % for {surely:.4g} strokes."
@@ -247,11 +257,12 @@ class LinkageReliability:
             )
         if self.beyond is not None:
             full = self.beyond[0]
+            error = np.sqrt(full * (1 - full) / self.samples)
             rows.append(
                 (
                     f"at any, of {self.samples} linkages in equilibrium",
-                    f"{full:.3g}",
-                    f"{np.sqrt(full * (1 - full) / self.samples):.1g}",
+                    f"{full:.3g}" if full else "none",
+                    f"{error:.1g}" if full else "",
                 )
             )
         return ResultTable(
@@ -264,23 +275,18 @@ class LinkageReliability:
     def _dimension_table(self) -> ResultTable:
         random, worst = self.random, self.worst_pose
         pins = len(self.linkage.pins)
+        units = {dimension.name: dimension.unit for dimension in dimensions_of(self.linkage)}
         rows = []
         for i, name in enumerate(random.names):
-            turns = name.endswith(".zero") and self._unit(name) == "deg"
-            scale, unit = (180 / np.pi, "deg") if turns else (1e3, "mm")
+            scale, unit = SHOWN[units.get(name, "m")]
             mean = f"{random.clearances.mean[i] * 1e3:.4f}" if i < pins else ""
-            rows.append((name, mean, f"{random.spreads[i] * scale:.4g} {unit}", f"{100 * random.shares[worst, i]:.1f}"))
+            rows.append((name, mean, f"{random.spreads[i] / scale:.4g} {unit}", f"{100 * random.shares[worst, i]:.1f}"))
         return ResultTable(
             title=f"Dimensions, at {self.labels[worst]}",
             heads=("dimension", "mean mm", "deviation", "share of the variance, %"),
             rows=rows,
             numbers=(1, 2, 3),
         )
-
-    def _unit(self, name: str) -> str:
-        body = name.removesuffix(".zero")
-        kinds = {coordinate.body: coordinate.kind for coordinate in self.linkage.coordinates}
-        return "deg" if kinds[body] == "angle" else "mm"
 
     def _life_table(self) -> ResultTable:
         rows = []
@@ -289,9 +295,9 @@ class LinkageReliability:
                 low, high = life.interval(part)
                 rows.append(
                     (
-                        _measure_text(life.measure),
+                        life.measure,
                         f"{life.limit * 1e3:g}",
-                        f"{1 - part:.0%}" + {0.1: ", B10", 0.5: ", B50"}.get(part, ""),
+                        f"{100 * (1 - part):.0f} %" + {0.1: ", B10", 0.5: ", B50"}.get(part, ""),
                         _count(life.quantile(part)),
                         f"{_count(low)} to {_count(high)}",
                         _count(life.draws.quantile_error(life.strokes, part)),
@@ -335,10 +341,7 @@ def rest_poses(linkage: Linkage, *, at: ArrayLike | None = None, path: Path | No
         InvalidValueError: a pose cannot be reached.
     """
     if at is not None:
-        goals = floats(at, "at")
-        if goals.shape[1] == 2:
-            return closed_at_poses(linkage, goals)
-        return np.array([close_pins(linkage, assembly_guess(linkage), drives=goal) for goal in goals])
+        return closed_at(linkage, at)
     if path is None:
         raise InvalidValueError("expected positions or a path")
     if integer(count, "poses", least=2) > _MOST_POSES:
@@ -355,7 +358,7 @@ def assess_linkage(
     deviations: Mapping[str, float] | None = None,
     limit: float | None = None,
     wear: WearStatement | None = None,
-    samples: int = 2000,
+    samples: int | None = None,
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> LinkageReliability:
@@ -365,26 +368,28 @@ def assess_linkage(
         linkage: with m pins.
         q: (p, n) coordinates with closed pins, at which the drives are locked; see ``rest_poses``.
         clearances: of the m pins.
-        deviations: standard deviations of lengths and of zeros of drives by name [m] or [rad].
+        deviations: standard deviations of other dimensions by name [m, rad, kg, N].
         limit: of the error [m].
         wear: of the linkage; without it there are no lives.
-        samples: how many random linkages are computed in complete equilibrium.
+        samples: how many random linkages are computed in complete equilibrium: 2000 where none is said, or 200 where
+            more than clearances is random, which takes longer.
         seed: of all samples.
         progress: is told what is being done.
 
     Raises:
         InvalidValueError: a number is out of its range, or a pin carries no force at rest.
-        UnknownNameError: there is no such length or zero of a drive.
+        UnknownNameError: there is no such dimension.
     """
     say = progress or (lambda _: None)
     random = RandomLinkage.at(linkage, q, clearances, deviations)
-    if integer(samples, "samples", least=2) * len(random.q) > _MOST_EQUILIBRIA:
+    count = integer(samples or _SAMPLES[bool(random.deviations)], "samples", least=2)
+    if count * len(random.q) > _MOST_EQUILIBRIA:
         raise InvalidValueError(
-            f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {samples}"
+            f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {count}"
         )
     say("random linkages in equilibrium")
-    z = np.random.default_rng(seed).normal(size=(samples, len(random.names)))
-    linear, full = _sampled_errors(random, z)
+    z = np.random.default_rng(seed).normal(size=(count, len(random.names)))
+    linear, full = random.drawn_errors(z), random.equilibria(z, say)
     at_poses = on_path = beyond = None
     if limit is not None:
         if not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
@@ -399,19 +404,11 @@ def assess_linkage(
         limit=limit,
         at_poses=at_poses,
         on_path=on_path,
-        samples=samples,
+        samples=count,
         nonlinearity=_nonlinearity(random, linear, full),
         beyond=beyond,
     )
     return assessed if wear is None else _with_lives(assessed, wear, seed, say)
-
-
-def _sampled_errors(random: RandomLinkage, z: Array) -> tuple[Array, Array]:
-    """Return (s, p, 2) errors by the linear law, and those of complete equilibria."""
-    clearances = random.clearances.values(z[:, : len(random.linkage.pins)])
-    exact = np.zeros((len(z), len(random.deviations)))
-    linear = random.drawn_errors(z)
-    return linear, random.equilibria(clearances) + linear - random.errors(clearances, exact)
 
 
 def _nonlinearity(random: RandomLinkage, linear: Array, full: Array) -> float:
@@ -459,10 +456,6 @@ def _after(life: LinkageLife, wear: WearStatement, seed: int) -> tuple[float, Es
 
 def _labels(linkage: Linkage, q: Array) -> tuple[str, ...]:
     return tuple(f"({x * 1e3:.4g}, {y * 1e3:.4g}) mm" for x, y in tip_position(linkage, q).tolist())
-
-
-def _measure_text(measure: Measure) -> str:
-    return "RP" if measure == "RP" else "error"
 
 
 def _count(value: float) -> str:

@@ -9,7 +9,7 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, TypeAlias
 
 import attrs
@@ -24,11 +24,10 @@ from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
+from armwright.reliability.tip_errors import sampled_tip_errors
 
 Shape: TypeAlias = Literal["normal", "lognormal"]
 SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
-# Dimensions, beside clearances, that may be random: those that a maker or an encoder gets wrong.
-_KINDS = ("length", "zero")
 # An eigenvalue of a covariance below this part of the largest is rounding.
 _FLAT = 1e-12
 # Equilibria that are solved at once.
@@ -124,7 +123,7 @@ class RandomLinkage:
         linkage: with m pins.
         q: (p, n) coordinates with closed pins, at which the drives are locked.
         clearances: of its m pins.
-        deviations: standard deviations of other dimensions by name, of lengths and of zeros of drives [m] or [rad].
+        deviations: standard deviations of other dimensions by name, as ``dimensions_of`` has them [m, rad, kg, N].
         offset: (p, 2) error of the tip with mean dimensions [m].
         jacobian: (p, 2, m) its derivatives by the clearances.
         others: (p, 2, k) its derivatives by the other dimensions.
@@ -152,14 +151,14 @@ class RandomLinkage:
             linkage: with m pins.
             q: (p, n) coordinates with closed pins, at which the drives are locked.
             clearances: of its m pins.
-            deviations: standard deviations of other dimensions by name [m] or [rad].
+            deviations: standard deviations of other dimensions by name [m, rad, kg, N].
 
         Raises:
             InvalidValueError: a pin carries no force at rest, or a number is out of its range.
-            UnknownNameError: there is no such length or zero of a drive.
+            UnknownNameError: there is no such dimension, beside the clearances.
         """
         given = dict(deviations or {})
-        known = [each.name for each in dimensions_of(linkage) if each.kind in _KINDS]
+        known = [each.name for each in dimensions_of(linkage) if each.kind != "clearance"]
         for name, value in given.items():
             not_negative(value, f"deviation of {one_of('dimension', name, known)}")
         closed = np.atleast_2d(floats(q, "q"))
@@ -234,13 +233,23 @@ class RandomLinkage:
         errors = np.tensordot(steps, self.jacobian, axes=([1], [2])) + self.offset
         return np.asarray(errors + np.tensordot(shifts, self.others, axes=([1], [2])))
 
-    def equilibria(self, clearances: Array) -> Array:
-        """Return (s, p, 2) errors of the tip in the complete equilibrium, the other dimensions being exact [m].
+    def equilibria(self, z: Array, say: Callable[[str], None] | None = None) -> Array:
+        """Return (s, p, 2) errors in complete equilibrium, of linkages that numbers (s, m + k) describe [m].
 
         Args:
-            clearances: (s, m) [m].
+            z: standard normal numbers.
+            say: is told how many are computed.
+
+        Raises:
+            InvalidValueError: one of the linkages cannot be assembled.
         """
-        start = tip_position(self.linkage, self.q)
+        m = len(self.linkage.pins)
+        clearances = self.clearances.values(z[:, :m])
+        if self.deviations:
+            means = dict(zip(self.linkage.clearances, self.clearances.mean.tolist(), strict=True))
+            names = [*(f"{pin}.clearance" for pin in means), *self.deviations]
+            steps = np.concatenate([clearances - self.clearances.mean, z[:, m:] * self.spreads[m:]], axis=1)
+            return sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps, say)
         blocks = np.array_split(clearances, max(1, len(clearances) * len(self.q) // _BLOCK))
         tips = [find_static_equilibrium(self.linkage, self.q, block[:, None]).tip for block in blocks]
-        return np.concatenate(tips) - start
+        return np.concatenate(tips) - tip_position(self.linkage, self.q)

@@ -13,8 +13,8 @@ from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
 from armwright.report.motion_table import csv_lines
 from armwright.report.static_page import static_page
 
-# Smaller probabilities are below the figures.
-_LEAST = 1e-10
+# Smaller probabilities are drawn as this one.
+_LEAST = 1e-100
 _NAMES = {"error": "error of the tip", "RP": "repeatability RP"}
 
 
@@ -90,13 +90,13 @@ def _drawings(assessment: LinkageReliability) -> Iterator[Drawing]:
 
 
 def _poses(assessment: LinkageReliability) -> str:
-    figure = empty_figure((7.4, 3.4))
+    figure = empty_figure((7.4, 3.8))
     axes = plain_axes(figure, "pose", "probability")
     assert assessment.at_poses is not None  # noqa: S101 - drawn only then
     shown = np.maximum(assessment.at_poses, _LEAST)
     axes.plot(np.arange(1, len(shown) + 1), shown, "o-", markersize=3)
     axes.set_yscale("log")
-    axes.set_ylim(max(shown.min() / 2, _LEAST), 1.5)
+    axes.set_ylim(top=min(10 * shown.max(), 2.0))
     return svg_text(figure, "Probability by pose")
 
 
