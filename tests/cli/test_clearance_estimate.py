@@ -7,6 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armwright.clearance.estimation.assessment import assess_rest
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
+from armwright.clearance.reader import load_linkage
 from cli_calls import armwright, check_mistake
 from five_bar_example import EXAMPLES, PATHS, REST, assert_clearances_found
 
@@ -50,7 +53,7 @@ def test_table_of_an_estimate() -> None:
     assert 0.001 < deviation < 0.01
     assert " yes " in lines["J4"]
     # 0.483 mm of play and a coefficient of 0.05.
-    assert "friction (0.05) may hold a journal 24 µm to either side" in done.stdout
+    assert "friction (0.05) holds each journal anywhere within its cone, up to 24 µm to either side" in done.stdout
 
 
 def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
@@ -68,7 +71,22 @@ def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
     assert done.stdout == ""
 
 
+def test_friction_widens_intervals() -> None:
+    """Friction makes intervals wider, by default that of the linkage; none leaves it out, which is said."""
+    linkage, measured = load_linkage("five-bar"), read_clearance_measurements(REST)
+    assert isinstance(measured, RestMeasurement)
+    without, own, same, more = (assess_rest(linkage, measured, friction=mu) for mu in (0.0, None, 0.05, 0.12))
+
+    for pin in ("J2", "J3", "J4"):
+        deviations = [found.parameters[pin]["deviation"] for found in (without, own, more)]
+        assert deviations == sorted(deviations)
+    assert own.as_data() == same.as_data()
+    assert any("is left out of the intervals" in note for note in without.notes)
+
+
 MISTAKES = [
+    (("estimate", "five-bar", REST, "--friction", "-1"), "friction: expected 0 or more, got -1"),
+    (("estimate", "five-bar", PATHS, "--friction", "0.1"), "on paths friction is that of the sweep"),
     (("estimate", "five-bar", "none.csv"), "none.csv: no such file"),
     (("estimate", "five-bar", PATHS), "measurements on paths need a sweep to compare with"),
     (("estimate", "five-bar", PATHS, "--sweep", "none", "--noise-um", "2"), "'none': the sweep does not exist"),
