@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.clearance.estimation.assessment import assess_rest
 from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
 from armwright.clearance.reader import load_linkage
 from cli_calls import armwright, check_mistake
@@ -72,16 +71,13 @@ def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
 
 
 def test_friction_widens_intervals() -> None:
-    """Friction makes intervals wider, by default that of the linkage; none leaves it out, which is said."""
+    """The more friction there is, the wider are the intervals."""
     linkage, measured = load_linkage("five-bar"), read_clearance_measurements(REST)
     assert isinstance(measured, RestMeasurement)
-    without, own, same, more = (assess_rest(linkage, measured, friction=mu) for mu in (0.0, None, 0.05, 0.12))
 
-    for pin in ("J2", "J3", "J4"):
-        deviations = [found.parameters[pin]["deviation"] for found in (without, own, more)]
-        assert deviations == sorted(deviations)
-    assert own.as_data() == same.as_data()
-    assert any("is left out of the intervals" in note for note in without.notes)
+    deviations = [measured.estimate(linkage, friction=mu).deviations for mu in (0.0, 0.05, 0.12)]
+
+    assert np.all(np.diff(deviations, axis=0) > 0)
 
 
 MISTAKES = [

@@ -166,8 +166,8 @@ def assess_rest(
     if mu > 0:
         part, reach = 1 - float(np.mean(estimate.noise_shares)), math.atan(mu) * largest
         notes.append(
-            f"friction ({mu:g}) holds each journal anywhere within its cone, up to {reach * 1e6:.2g} µm to either side, "
-            f"the same in all readings of a pose: {part:.0%} of the variances are of that"
+            f"friction ({mu:g}) holds each journal anywhere within its cone, up to {reach * 1e6:.2g} µm to either side"
+            f", the same in all readings of a pose: {part:.0%} of the variances are of that"
         )
     else:
         notes.append("friction, which may hold journals beside their assumed positions, is left out of the intervals")
