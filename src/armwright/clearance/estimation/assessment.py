@@ -130,22 +130,27 @@ def _model_error_cells(error: ModelError) -> tuple[str, ...]:
     return (error.name, limit, f"{usual:g} {unit}", *(f"{x * usual / scale * 1e6:+z.1f}" for x in error.shifts))
 
 
-def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None = None) -> EstimateAssessment:
+def assess_rest(
+    linkage: Linkage, measured: RestMeasurement, noise: float | None = None, *, friction: float | None = None
+) -> EstimateAssessment:
     """Estimate clearances from readings of a resting tip.
 
     Args:
         linkage: that was measured.
         measured: the readings.
         noise: standard deviation of one coordinate of one reading; that of repeated readings without it [m].
+        friction: coefficient of friction, which holds the journals anywhere in their cones; that of the material when
+            left out, and 0 where the readings are to be taken as they are.
 
     Raises:
-        InvalidValueError: the noise is not above 0.
+        InvalidValueError: the noise is not above 0, or the friction below 0.
         ContradictionError: no clearances explain the readings.
         TooFewError: the poses do not determine all clearances.
     """
     if noise is not None:
         positive(noise, "noise", "m")
-    estimate = measured.estimate(linkage, noise)
+    mu = linkage.material.friction if friction is None else friction
+    estimate = measured.estimate(linkage, noise, friction=mu)
     noise_is_known = bool(noise or measured.noise)
     largest = float(estimate.values.max())
     misfit, widening = float(estimate.misfit), float(estimate.widening)
@@ -158,12 +163,14 @@ def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None
         *([] if noise_is_known else [_unknown_noise_note(estimate)]),
         *_fit_notes(misfit, widening),
     ]
-    friction = linkage.material.friction
-    if friction:
+    if mu > 0:
+        part, reach = 1 - float(np.mean(estimate.noise_shares)), math.atan(mu) * largest
         notes.append(
-            f"friction ({friction:g}) may hold a journal {math.atan(friction) * largest * 1e6:.2g} µm to either side "
-            f"of its assumed position; the intervals do not include that"
+            f"friction ({mu:g}) holds each journal anywhere within its cone, up to {reach * 1e6:.2g} µm to either side"
+            f", the same in all readings of a pose: {part:.0%} of the variances are of that"
         )
+    else:
+        notes.append("friction, which may hold journals beside their assumed positions, is left out of the intervals")
     notes += [
         f"{name} is indistinguishable from 0 mm: it is less than its standard deviation"
         for name in compress(estimate.names, estimate.at_bound)
