@@ -11,7 +11,7 @@ from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
 from clearance.arms import beginning
-from clearance.exudyn_five_bar import simulated
+from clearance.exudyn_five_bar import efforts_of, simulated
 
 # Slow: a half of its tests is drawn.
 pytestmark = pytest.mark.part(0.5)
@@ -41,13 +41,8 @@ def test_up_to_the_impacts(linkage: Linkage) -> None:
     task = prepare_scenario(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
     run = simulate(task, [CLEARANCE] * 3)
     samples = round(END / EVERY) + 1
-    efforts = task.ideal.efforts
-
-    def torques(t: float) -> np.ndarray:
-        i = min(int(t / task.h), len(efforts) - 2)
-        return np.asarray(efforts[i] + (t / task.h - i) * (efforts[i + 1] - efforts[i]))
-
-    K = float(contact_stiffness(linkage, np.full(3, CLEARANCE))[0])
+    torques = efforts_of(task)
+    K = contact_stiffness(linkage, np.full(3, CLEARANCE))
     apart = {}
     for step in (1e-5, 5e-6):
         tip = simulated(linkage, run.q[0], torques, K, duration=END, step=step, every=EVERY)

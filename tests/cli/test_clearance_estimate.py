@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_clearance_measurements
+from armwright.clearance.reader import load_linkage
 from cli_calls import armwright, check_mistake
 from five_bar_example import EXAMPLES, PATHS, REST, assert_clearances_found
 
@@ -50,7 +52,7 @@ def test_table_of_an_estimate() -> None:
     assert 0.001 < deviation < 0.01
     assert " yes " in lines["J4"]
     # 0.483 mm of play and a coefficient of 0.05.
-    assert "friction (0.05) may hold a journal 24 µm to either side" in done.stdout
+    assert "friction (0.05) holds each journal anywhere within its cone, up to 24 µm to either side" in done.stdout
 
 
 def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
@@ -68,7 +70,19 @@ def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
     assert done.stdout == ""
 
 
+def test_friction_widens_intervals() -> None:
+    """The more friction there is, the wider are the intervals."""
+    linkage, measured = load_linkage("five-bar"), read_clearance_measurements(REST)
+    assert isinstance(measured, RestMeasurement)
+
+    deviations = [measured.estimate(linkage, friction=mu).deviations for mu in (0.0, 0.05, 0.12)]
+
+    assert np.all(np.diff(deviations, axis=0) > 0)
+
+
 MISTAKES = [
+    (("estimate", "five-bar", REST, "--friction", "-1"), "friction: expected 0 or more, got -1"),
+    (("estimate", "five-bar", PATHS, "--friction", "0.1"), "on paths friction is that of the sweep"),
     (("estimate", "five-bar", "none.csv"), "none.csv: no such file"),
     (("estimate", "five-bar", PATHS), "measurements on paths need a sweep to compare with"),
     (("estimate", "five-bar", PATHS, "--sweep", "none", "--noise-um", "2"), "'none': the sweep does not exist"),

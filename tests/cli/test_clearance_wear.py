@@ -21,6 +21,17 @@ def test_wear_of_the_four_bar(tmp_path: Path) -> None:
     assert data["lives"][0]["strokes"] == {"5 %": 0.0, "50 %": 0.0, "95 %": 0.0}
     files = {path.name for path in (tmp_path / "worn").iterdir()}
     assert {"report.html", "wear.json", "life.csv", "profiles.csv", "profiles.svg", "life.svg"} <= files
+    new, worn = data["simulated"]
+    assert (new["strokes"], worn["strokes"]) == (0.0, data["strokes"][-1])
+
+    # The worn pins are those of a simulation.
+    run = armwright(
+        "clearance", "simulate", *SMALL[:3], "--revolutions", "0.2", "--worn", str(tmp_path / "worn" / "wear.json"),
+        "--strokes", "1e3", "--json",
+    )  # fmt: skip
+    told = json.loads(run.stdout)
+    assert told["worn_strokes"] == 1e3
+    assert 0 < told["pins"]["B"]["wall_growth"] < data["pins"][0]["bearing_depth"]
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,16 @@ def test_of_one_configuration() -> None:
     np.testing.assert_allclose(row["displacement_m"], expected.displacement[0], rtol=1e-12)
 
 
+def test_of_the_gears_of_the_arm() -> None:
+    """Without a stiffness it is that of the gears in the arm file."""
+    file = str(Path(__file__).parents[2] / "examples" / "two_link_springs.toml")
+    own = armwright("deflection", file, "-q", "57.3,68.75", "--json")
+    K = load_arm(file).motor_values("stiffness").tolist()
+    given = armwright("deflection", file, "-q", "57.3,68.75", "--stiffness", ",".join(map(repr, K)), "--json")
+
+    assert json.loads(own.stdout)["rows"] == json.loads(given.stdout)["rows"]
+
+
 def test_of_a_program(tmp_path: Path) -> None:
     """A table has a page and corrected positions, from which the loaded arm has its tool where the rigid arm has it."""
     q = np.linspace([0, -0.4, 0.5, 0, 0.6, 0], [1, 0.2, 0.9, 0.4, 0.8, 0.2], 4)
@@ -68,9 +78,9 @@ def test_of_a_program(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("--stiffness", "1e4"), "expected the configurations, either one as -q or a table of them as --csv FILE"),
-        (("-q", Q_DEG), "Missing option '--stiffness'"),
-        (("-q", Q_DEG, "--stiffness", "0"), "expected numbers from 0.001 to 1e+15, or a file that ends in .toml"),
-        (("-q", Q_DEG, "--stiffness", "1,2"), "expected 6 finite numbers"),
+        (("-q", Q_DEG), "expected a stiffness: the gears of puma560 are rigid"),
+        (("-q", Q_DEG, "--stiffness", "0"), "expected 0.001 to 1e+12, got 0"),
+        (("-q", Q_DEG, "--stiffness", "1,2"), "expected one number, or 6, one per joint, got 2"),
         (("-q", Q_DEG, "--stiffness", "1"), "yields by more than 0.5 rad or m"),
     ],
 )

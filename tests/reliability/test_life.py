@@ -149,7 +149,8 @@ def test_bad_numbers() -> None:
         play_life(PUMA, np.zeros(6), -1e-6, WearRates(median=np.zeros(6), spread=np.zeros(6)), 1e-4)
     with pytest.raises(InvalidValueError, match="first"):
         rate_after(-1.0, [], [], [])
-    for quantile in (rate_after(0.0, [], [], []).quantile, PlayLife(np.ones(3), *[np.ones(1)] * 3, 0).quantile):
+    life = PlayLife(np.ones(3), *[np.ones(1)] * 3, 0, np.ones((3, 1)))
+    for quantile in (rate_after(0.0, [], [], []).quantile, life.quantile):
         with pytest.raises(InvalidValueError, match="expected 0 to 1, got nan"):
             quantile(np.nan)
     with pytest.raises(InvalidValueError, match="peak: expected more than 0"):

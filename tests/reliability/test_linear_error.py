@@ -106,6 +106,13 @@ def test_shares(rng: np.random.Generator) -> None:
         np.testing.assert_allclose(ratio, 4)
 
 
+def test_next_to_impossible() -> None:
+    """Far beyond all deviations sampling still agrees with the exact law, and nothing overflows."""
+    error = LinearError(names=("x", "y"), deviations=[1.0, 1.0], offset=[[0.0, 0.0]], jacobian=[[[1.0, 0], [0, 1.0]]])
+
+    assert error.path_probability(35.0).probability == pytest.approx(np.exp(-(35.0**2) / 2), rel=0.05)
+
+
 def test_certain_and_impossible() -> None:
     """A mean beyond the limit fails for certain where nothing varies; without deviations within it nothing does."""
     still = LinearError(names=("a",), deviations=[0.0], offset=[[2.0, 0]], jacobian=[[[1.0], [0]]])

@@ -11,8 +11,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.positions import ranges
 from armwright.errors import FileFormatError, InvalidValueError
 from armwright.reliability.allocation import allocate, error_bounds
-from armwright.reliability.arm_errors import sampled_errors, tool_error
-from armwright.reliability.assessment import assess_tolerances
+from armwright.reliability.arm_errors import assess_tolerances, sampled_errors, tool_error
+from armwright.reliability.farthest_point import farthest_point
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tolerances import Tolerance, dimensions, read_tolerances
 from armwright.reliability.worst_case import longest_sum
@@ -45,10 +45,7 @@ def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
 
 def named(widths: np.ndarray, cost: float = 1.0, exponent: float = 1.0) -> list[Tolerance]:
     """Tolerances of lengths."""
-    return [
-        Tolerance(name=f"x{i}", half_width=width, is_length=True, cost=cost, exponent=exponent)
-        for i, width in enumerate(widths)
-    ]
+    return [Tolerance(name=f"x{i}", half_width=width, cost=cost, exponent=exponent) for i, width in enumerate(widths)]
 
 
 def unit_error(jacobian: np.ndarray) -> LinearError:
@@ -141,9 +138,7 @@ def test_tool_error_is_linear(tolerances: tuple[Tolerance, ...], rng: np.random.
 def test_least_cost_of_one_direction(rng: np.random.Generator) -> None:
     """In one dimension at one pose the least cost has a closed form."""
     a, cost, limit = rng.uniform(0.1, 3, 6), rng.uniform(0.5, 4, 6), 0.7
-    tolerances = [
-        Tolerance(name=f"x{i}", half_width=1.0, is_length=True, cost=c, exponent=1.0) for i, c in enumerate(cost)
-    ]
+    tolerances = [Tolerance(name=f"x{i}", half_width=1.0, cost=c, exponent=1.0) for i, c in enumerate(cost)]
     error = unit_error(a[None, None])
 
     worst = allocate(tolerances, error, limit, "worst-case")
@@ -215,11 +210,11 @@ def test_linear_law_is_compared_for_the_same_arms(*, uniform: bool) -> None:
     """By whatever law arms are drawn, the linear one is near for small tolerances, and is said not to be for large."""
     q = [[0.1, -0.3, 0.5, 0, 0.7, 0]]
     for degrees, near in ((0.01, True), (180.0, False)):
-        swing = [Tolerance(name="joint1.theta", half_width=np.radians(degrees), is_length=False)]
+        swing = [Tolerance(name="joint1.theta", half_width=np.radians(degrees), unit="rad")]
         found = assess_tolerances(PUMA, q, swing, samples=200, uniform=uniform)
         assert (found.nonlinearity < 1e-4) == near
         assert any("trust the sampled" in note for note in found.notes) == (not near)
-    spin = [Tolerance(name="tool.rx", half_width=0.01, is_length=False)]
+    spin = [Tolerance(name="tool.rx", half_width=0.01, unit="rad")]
     assert assess_tolerances(PUMA, q, spin, samples=20).nonlinearity < 1e-3
 
 
@@ -230,7 +225,7 @@ def test_long_tables_are_thinned(tolerances: tuple[Tolerance, ...]) -> None:
     found = assess_tolerances(PUMA, q, tolerances, samples=10, most=4)
 
     assert found.numbers.tolist() == [1, 3334, 6667, 10_000]
-    np.testing.assert_array_equal(found.q, q[found.numbers - 1])
+    np.testing.assert_array_equal(found.mechanism.poses["q"], q[found.numbers - 1])
     assert any("4 of the 10000 poses" in note for note in found.notes)
     assert [pose["number"] for pose in found.as_data()["poses"]] == found.numbers.tolist()
 
@@ -238,7 +233,7 @@ def test_long_tables_are_thinned(tolerances: tuple[Tolerance, ...]) -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"samples": 10**9}, "at most 20000000 random arms"),
+        ({"samples": 10**9}, "at most 20000000 random mechanisms"),
         ({"limit": 1e-300}, "limit: expected 1e-12 to"),
         ({"limit": 1e90}, "limit: expected 1e-12 to"),
     ],
@@ -247,3 +242,51 @@ def test_what_is_too_much(options: dict, said: str, tolerances: tuple[Tolerance,
     """Numbers of samples and limits are bounded."""
     with pytest.raises(InvalidValueError, match=said):
         assess_tolerances(PUMA, np.zeros(6), tolerances, **options)
+
+
+@pytest.mark.parametrize("rule", ["worst-case", "statistical"])
+def test_least_cost_beside_a_mean_error(rule: str, rng: np.random.Generator) -> None:
+    """A mean error leaves the rest of the limit; a tolerance that has a most is not wider, which costs more."""
+    a, mean, limit = np.array([1.0, 2.0, 0.5]), 0.4, 1.0
+    line = LinearError(names=("x", "y", "z"), deviations=np.ones(3), offset=[[mean]], jacobian=a[None, None])
+    centred = allocate(named(np.ones(3)), unit_error(a[None, None]), limit - mean, rule)
+    np.testing.assert_allclose(
+        allocate(named(np.ones(3)), line, limit, rule).half_widths, centred.half_widths, rtol=1e-4
+    )
+
+    error = LinearError(
+        names=tuple("abcd"), deviations=np.ones(4), offset=rng.normal(scale=0.1, size=(3, 2)),
+        jacobian=rng.normal(size=(3, 2, 4)),
+    )  # fmt: skip
+    bounded = [Tolerance(name=f"x{i}", half_width=0.05, most=0.06 if i == 2 else np.inf) for i in range(4)]
+    free, held = allocate(named(np.full(4, 0.05)), error, limit, rule), allocate(bounded, error, limit, rule)
+    assert free.half_widths[2] > 0.06
+    assert held.half_widths[2] <= 0.06 * (1 + 1e-9)
+    for found in (free, held):
+        assert error_bounds(error, found.half_widths, rule)[0].max() <= limit * (1 + 1e-9)
+        assert found.costs.sum() <= found.least_cost * (1 + 1e-6)
+    assert held.costs.sum() > free.costs.sum()
+    narrow = [Tolerance(name=f"x{i}", half_width=0.01, most=0.02) for i in range(3)]
+    np.testing.assert_array_equal(allocate(narrow, line, limit, rule).half_widths, [0.02] * 3)
+    with pytest.raises(InvalidValueError, match="limit: expected more than the mean error, 400 mm"):
+        allocate(named(np.ones(3)), line, mean, rule)
+
+
+@pytest.mark.proof
+def test_farthest_point(sample: Sample) -> None:
+    """No point of the ellipsoid is farther, and near it none is much nearer; flat ones and centred ones included."""
+    for rng in sample.cases(300):
+        d = int(rng.integers(1, 4))
+        root = rng.normal(size=(d, d)) * rng.choice([0, 1], size=d, p=[0.2, 0.8]) * 10 ** rng.uniform(-3, 3)
+        mean = rng.normal(size=d) * rng.choice([0, 1]) * abs(root).max()
+        if rng.random() < 0.3:
+            # The hard case: the mean is across the longest axis.
+            mean -= (axis := np.linalg.svd(root)[0][:, 0]) * (axis @ mean)
+        z = rng.normal(size=(20000, d))
+        around = mean + (z / np.linalg.norm(z, axis=1)[:, None]) @ root.T
+
+        found = np.linalg.norm(farthest_point(mean, root @ root.T))
+
+        assert np.linalg.norm(around, axis=1).max() <= found * (1 + 1e-7)
+        assert np.linalg.norm(around, axis=1).max() == pytest.approx(found, rel=2e-2)
+    sample.record("farthest points of ellipsoids", sample.count(300), 0)

@@ -12,7 +12,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Limits, Motor
 from armwright.arrays import Array
 from armwright.dynamics.flexible_joints import modes, with_gears
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.simulation.controllers import pd, standing
 from armwright.simulation.flexible_joints import simulate_flexible
 from armwright.simulation.integrators import Adaptive
@@ -149,6 +149,10 @@ def test_refused(rng: np.random.Generator) -> None:
         simulate_flexible(with_gears(coupled(random_arm(rng, 3), rng), 1e4), np.zeros(3), duration=0.1)
     with pytest.raises(InvalidValueError, match="neither efforts nor a start"):
         simulate_flexible(TWO_LINKS, START, duration=0.1, motors=standing(START), theta=START)
+    with pytest.raises(ShapeError, match=r"motion of the motors at 0 s: expected shape \(2,\), got \(1,\)"):
+        simulate_flexible(TWO_LINKS, START, duration=0.1, motors=standing(START[:1]))
+    with pytest.raises(ShapeError, match=r"efforts of the controller at 0.\d+ s: expected shape \(2,\), got \(1,\)"):
+        simulate_flexible(TWO_LINKS, START, duration=0.1, controller=lambda t, _q, _qd: np.zeros(2 if t < 0.05 else 1))
     with pytest.raises(InvalidValueError, match="shorter or the period longer"):
         simulate_flexible(TWO_LINKS, START, duration=1e9)
     with pytest.raises(InvalidValueError, match="leave such a gear rigid"):

@@ -38,6 +38,7 @@ class ClearanceRun:
         rows: how many samples are finite, counted from the start.
         predictability: until when it is a prediction; None where that was not looked at.
         energy: its energy balance.
+        strokes: that its worn pins have made; None for new pins.
         gaps: (s, p, 2) from the middle of each bearing to that of its journal [m].
         depths: (s, p) indentation of each journal into its bearing; below 0 in free flight [m].
     """
@@ -45,12 +46,19 @@ class ClearanceRun:
     simulation: Simulation
     rows: int
     predictability: Predictability | None
+    strokes: float | None
     energy: EnergyBalance
     gaps: Array
     depths: Array
 
     @classmethod
-    def of(cls, simulation: Simulation, predictability: Predictability | None = None) -> ClearanceRun:
+    def of(
+        cls,
+        simulation: Simulation,
+        predictability: Predictability | None = None,
+        *,
+        strokes: float | None = None,
+    ) -> ClearanceRun:
         """Return a run with its energy balance, gaps and indentations.
 
         Raises:
@@ -65,7 +73,13 @@ class ClearanceRun:
         finite = np.isfinite(np.concatenate(numbers, axis=-1)).all(axis=-1)
         rows = len(simulation.time) if finite.all() else max(1, int(np.argmin(finite)))
         return cls(
-            simulation=simulation, rows=rows, predictability=predictability, energy=energy, gaps=gaps, depths=depths
+            simulation=simulation,
+            rows=rows,
+            predictability=predictability,
+            strokes=strokes,
+            energy=energy,
+            gaps=gaps,
+            depths=depths,
         )
 
     @property
@@ -90,9 +104,10 @@ class ClearanceRun:
 
     @property
     def warnings(self) -> list[str]:
-        """Those of the notes that a reader must not overlook: all, unless the run is predictable to its end."""
+        """Those of the notes that a reader must not overlook: but for asked-for wear and the certainty of a run."""
         certain = self.predictability is not None and self.predictability.to_the_end
-        return [note for note in self.notes if not (certain and note in _predictability_notes(self))]
+        harmless = [*_wear_notes(self), *(_predictability_notes(self) if certain else ())]
+        return [note for note in self.notes if note not in harmless]
 
     @property
     def notes(self) -> list[str]:
@@ -104,6 +119,7 @@ class ClearanceRun:
                 f"shown until {self.time[-1]:.4g} s"
             )
         notes.extend(_predictability_notes(self))
+        notes.extend(_wear_notes(self))
         energy, rows = self.energy, slice(self.rows)
         # The error of the integration has to be small beside the losses, not beside the work that went through.
         lost = float((energy.impact_loss + energy.friction_loss + energy.damping_loss)[rows][-1])
@@ -129,6 +145,7 @@ class ClearanceRun:
             "linkage": scenario.linkage.name,
             "path": scenario.path.name,
             "duration": scenario.path.duration,
+            "worn_strokes": self.strokes,
             "status": Status(int(simulation.status)).name.lower(),
             "sound_until": float(self.time[-1]),
             "predictable_until": None if self.predictability is None else self.predictability.until,
@@ -268,6 +285,7 @@ def _pin_data(run: ClearanceRun, i: int) -> dict[str, Any]:
     forces, depths = run.simulation.forces[: run.rows, i], run.depths[: run.rows, i]
     return {
         "clearance": float(run.simulation.clearances[i]),
+        "wall_growth": 0.0 if run.simulation.worn is None else run.simulation.worn.largest(i),
         "peak_force": finite_or_none(run.simulation.peaks[i]),
         "mean_force": float(forces.mean()),
         "impacts": int(run.simulation.impacts[i]),
@@ -326,6 +344,20 @@ def settings_data(run: ClearanceRun) -> dict[str, Any]:
     if how.control == "pd+ff":
         data["gains"] = list(how.gains)
     return data
+
+
+def _wear_notes(run: ClearanceRun) -> Iterator[str]:
+    """Say how worn the pins are, and how well their walls are known."""
+    worn = run.simulation.worn
+    if worn is None:
+        return
+    names = [pin.name for pin in run.simulation.scenario.linkage.pins]
+    growths = ", ".join(f"{name} {worn.largest(i) * 1e6:.3g} µm" for i, name in enumerate(names))
+    after = "" if run.strokes is None else f" after {run.strokes:.4g} strokes"
+    yield (
+        f"worn pins{after}: their journals can go farther than the clearance by up to {growths}; "
+        f"corners of the worn walls are rounded by at most {worn.smoothing.max() * 1e6:.2g} µm"
+    )
 
 
 def _predictability_notes(run: ClearanceRun) -> Iterator[str]:

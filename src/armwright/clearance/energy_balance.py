@@ -8,7 +8,6 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.equations import kinetic_energy, potential_energy, strain_energy
 from armwright.clearance.placement import Placement
-from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.simulation import Simulation
 
 # The fields of a balance that are 0 without elastic bodies.
@@ -52,14 +51,13 @@ def energy_balance(simulation: Simulation) -> EnergyBalance:
     linkage = simulation.scenario.linkage
     q, qd = ([x[..., i] for i in range(x.shape[-1])] for x in (simulation.q, simulation.qd))
     placement = Placement(linkage, q, qd)
-    K = contact_stiffness(linkage, simulation.clearances)
     depths = np.maximum(simulation.depths, 0.0)
     potential = np.asarray(potential_energy(placement))
     return EnergyBalance(
         driven=simulation.works["driven"],
         kinetic=np.asarray(kinetic_energy(placement)),
         potential=potential - potential[..., :1],
-        stored=np.asarray((0.4 * K[..., None, :] * depths**2.5).sum(axis=-1)),
+        stored=np.asarray((0.4 * simulation.stiffness[..., None, :] * depths**2.5).sum(axis=-1)),
         impact_loss=simulation.works["impact loss"],
         friction_loss=simulation.works["friction loss"],
         strain=np.broadcast_to(strain_energy(placement), potential.shape),

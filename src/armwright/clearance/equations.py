@@ -21,9 +21,9 @@ from armwright.clearance.contact import (
     normal_force,
     smooth_slip,
 )
-from armwright.clearance.linkage import ClearancePin, Linkage, Pin
+from armwright.clearance.linkage import GROUND, ClearancePin, Coordinate, Linkage
 from armwright.clearance.placement import Placement, Vec2
-from armwright.tracing.scalar import Scalar, select, sqrt
+from armwright.tracing.scalar import Scalar, atan2, select, sqrt
 
 SlipSpeed: TypeAlias = Literal["surface", "centre"]
 
@@ -82,6 +82,20 @@ class ContactMemory(NamedTuple):
     touching: Scalar
     speed: Scalar
     deflection: Scalar = 0.0
+
+
+class Wall(NamedTuple):
+    """The worn wall of a pin where its journal is; see ``worn_walls``.
+
+    Attributes:
+        growth: how much farther than the clearance it is [m].
+        slope: derivative by the direction of the gap in the bearing [m/rad].
+        turning: derivative by the rotation of the journal in the bearing [m/rad].
+    """
+
+    growth: Scalar
+    slope: Scalar
+    turning: Scalar
 
 
 class State(NamedTuple):
@@ -143,7 +157,13 @@ class Rates(NamedTuple):
 
 
 def rates(
-    linkage: Linkage, friction: FrictionModel, state: State, drives: Sequence[Scalar], contacts: Sequence[Contact]
+    linkage: Linkage,
+    friction: FrictionModel,
+    state: State,
+    drives: Sequence[Scalar],
+    contacts: Sequence[Contact],
+    *,
+    walls: Sequence[Wall] | None = None,
 ) -> Rates:
     """Return the accelerations, efforts, powers and energies of a linkage with clearance.
 
@@ -153,14 +173,15 @@ def rates(
         state: of the linkage.
         drives: of each drive its effort [N m, N], or its acceleration where its motion is prescribed.
         contacts: parameters of the contact law of each pin.
+        walls: of each pin, where they are worn.
     """
     placement = Placement(linkage, state.q, state.qd)
     force = free_forces(placement)
     pins, impact_loss, friction_loss, stored = [], 0.0, 0.0, 0.0
-    for parameters in zip(linkage.pins, contacts, state.memories, strict=True):
-        pin = _pin_contact(placement, friction, *parameters)
-        for i, push in pin.forces.items():
-            force[i] = force[i] + push
+    for i, parameters in enumerate(zip(linkage.pins, contacts, state.memories, strict=True)):
+        pin = _pin_contact(placement, friction, *parameters, worn=walls[i] if walls else None)
+        for k, push in pin.forces.items():
+            force[k] = force[k] + push
         pins.append(pin)
         impact_loss = impact_loss + pin.losses[0]
         friction_loss = friction_loss + pin.losses[1]
@@ -168,7 +189,7 @@ def rates(
     qdd, efforts = _accelerations(placement, mass_matrix(placement), force, drives)
     driven = 0.0
     for drive, effort in zip(linkage.drives, efforts, strict=True):
-        for i, weight in drive_weights(placement, drive.body).items():
+        for i, weight in drive_weights(linkage, drive.body).items():
             driven = driven + effort * weight * state.qd[i]
     powers = [driven, impact_loss, friction_loss]
     if placement.rods:
@@ -250,13 +271,17 @@ def strain_energy(placement: Placement) -> Scalar:
     return sum((0.5 * k * placement.q[i] * placement.q[i] for i, k, _ in rod_springs(placement)), 0.0)
 
 
-def drive_weights(placement: Placement, body: str) -> dict[int, float]:
+def drive_weights(linkage: Linkage, body: str) -> dict[int, float]:
     """Return the weights of a drive's effort on the coordinates, also on those of the body that carries it."""
-    linkage = placement.linkage
-    joint = linkage.joint(body)
-    weights = {next(i for i, coordinate in enumerate(linkage.coordinates) if coordinate.body == body): 1.0}
-    if isinstance(joint, Pin):
-        weights |= {i: -weight for i, weight in placement.section(joint.on).angle_partials.items()}
+    coordinates, joint = linkage.coordinates, linkage.joint(body)
+    weights = {next(i for i, coordinate in enumerate(coordinates) if coordinate.body == body): 1.0}
+    carrier_angle = Coordinate(linkage.rotation_carrier(body) or GROUND, "angle")
+    if carrier_angle in coordinates:
+        weights[coordinates.index(carrier_angle)] = -1.0
+    if joint is not None and joint.on.body in (rods := linkage.rods):
+        first = coordinates.index(Coordinate(joint.on.body, "bend1"))
+        slopes = rods[joint.on.body].section_at(linkage.point(joint.on)).slopes
+        weights |= {first + i: -slope for i, slope in enumerate(slopes)}
     return weights
 
 
@@ -271,7 +296,7 @@ def _accelerations(
         if drive.kind == "motion":
             prescribed[number] = value
         else:
-            for i, weight in drive_weights(placement, drive.body).items():
+            for i, weight in drive_weights(linkage, drive.body).items():
                 force[i] = force[i] + weight * value
         efforts.append(value)
     free = [i for i in range(len(force)) if i not in prescribed]
@@ -287,7 +312,7 @@ def _accelerations(
     for number in sorted(moving, reverse=True):
         row = [_entry(M, number, j) * qdd[j] for j in range(len(qdd)) if (max(number, j), min(number, j)) in M]
         efforts[moving[number]] = effort = sum(row) - force[number]
-        for i, weight in drive_weights(placement, linkage.drives[moving[number]].body).items():
+        for i, weight in drive_weights(linkage, linkage.drives[moving[number]].body).items():
             if i != number:
                 force[i] = force[i] + weight * effort
     return qdd, efforts
@@ -329,8 +354,70 @@ def solve(M: Mapping[tuple[int, int], Scalar], right: Mapping[int, Scalar]) -> d
 # ---- contacts ------------------------------------------------------------------------------------------------------
 
 
+class _Touch(NamedTuple):
+    """Where a journal is from the wall of its bearing, and where they would touch.
+
+    Attributes:
+        depth: δ [m].
+        rate: δ̇ [m/s].
+        outward: normal of the wall.
+        steepness: length of the gradient of the depth; the surfaces press harder by it.
+        wall: distance of the place of contact from the centre of the bearing, along the normal [m].
+        inside: its distance from the centre of the journal [m].
+        arm: from the centre of the bearing to it [m].
+        couple: of a force of 1 N; a worn journal is not pressed through its middle [m].
+    """
+
+    depth: Scalar
+    rate: Scalar
+    outward: Vec2
+    steepness: Scalar
+    wall: Scalar
+    inside: Scalar
+    arm: Vec2
+    couple: Scalar
+
+
+def pin_place(placement: Placement, pin: ClearancePin) -> tuple[Scalar, Scalar]:
+    """Return the direction of the gap of a pin in the axes of its bearing, and the rotation of its journal [rad]."""
+    own, other = placement.frames[pin.bearing.body].axis, placement.frames[pin.journal.body].axis
+    gap = placement.point(pin.journal).position.minus(placement.point(pin.bearing).position)
+    across = own.perpendicular()
+    return atan2(across.dot(gap), own.dot(gap)), atan2(across.dot(other), own.dot(other))
+
+
+def _touch(placement: Placement, pin: ClearancePin, clearance: Scalar, worn: Wall | None) -> _Touch:
+    """Return where the journal of a pin is from its wall, round or worn."""
+    bearing, journal = placement.point(pin.bearing), placement.point(pin.journal)
+    gap = journal.position.minus(bearing.position)
+    distance = sqrt(gap.dot(gap))
+    inverse = 1.0 / select(distance > _TINY, distance, _TINY)
+    radial = gap.times(inverse)
+    velocity = journal.velocity.minus(bearing.velocity)
+    if worn is None:
+        wall = clearance + pin.journal_radius
+        touch = wall, wall - distance, radial.times(wall)
+        return _Touch(distance - clearance, velocity.dot(radial), radial, 1.0, *touch, 0.0)
+    hole, shaft = placement.section(pin.bearing).spin, placement.section(pin.journal).spin
+    gradient = radial.minus(radial.perpendicular().times(worn.slope * inverse))
+    # The wall turns with the bearing, and what the journal has lost turns with the journal.
+    rate = velocity.dot(gradient) + worn.slope * hole - worn.turning * (shaft - hole)
+    steepness = sqrt(gradient.dot(gradient))
+    outward = gradient.times(1.0 / select(steepness > _TINY, steepness, 1.0))
+    depth = distance - (clearance + worn.growth)
+    inside = pin.journal_radius - depth
+    touch = gap.dot(outward) + inside, inside, gap.plus(outward.times(inside))
+    return _Touch(depth, rate, outward, steepness, *touch, worn.turning)
+
+
 def _pin_contact(
-    placement: Placement, friction: FrictionModel, pin: ClearancePin, contact: Contact, memory: ContactMemory
+    placement: Placement,
+    friction: FrictionModel,
+    pin: ClearancePin,
+    contact: Contact,
+    memory: ContactMemory,
+    *,
+    worn: Wall | None,
 ) -> PinContact:
     """Return the contact in a pin.
 
@@ -338,19 +425,15 @@ def _pin_contact(
     """
     bearing, journal = placement.point(pin.bearing), placement.point(pin.journal)
     hole, shaft = placement.section(pin.bearing), placement.section(pin.journal)
-    gap = journal.position.minus(bearing.position)
-    distance = sqrt(gap.dot(gap))
-    outward = gap.times(1.0 / select(distance > _TINY, distance, _TINY))
+    touch = _touch(placement, pin, contact.clearance, worn)
+    outward, depth, rate = touch.outward, touch.depth, touch.rate
     along = outward.perpendicular()
-    velocity = journal.velocity.minus(bearing.velocity)
-    depth, rate = distance - contact.clearance, velocity.dot(outward)
-    wall = contact.clearance + pin.journal_radius
-    inside = wall - distance
-    centre_slip = velocity.dot(along)
-    surface_slip = centre_slip + shaft.spin * inside - hole.spin * wall
+    centre_slip = journal.velocity.minus(bearing.velocity).dot(along)
+    surface_slip = centre_slip + shaft.spin * touch.inside - hole.spin * touch.wall
     slip = surface_slip if friction.velocity == "surface" else centre_slip
     speed = select(memory.touching > 0.5, memory.speed, select(rate > SLOWEST_IMPACT, rate, SLOWEST_IMPACT))
-    normal = normal_force(depth, rate, speed, contact.stiffness, contact.damping)
+    pressing = normal_force(depth, rate, speed, contact.stiffness, contact.damping)
+    normal = pressing * touch.steepness
     deflection_rate = 0.0
     if friction.law == "lugre":
         coefficient, deflection_rate = Bristles.step(memory.deflection, slip, contact.friction)
@@ -361,21 +444,26 @@ def _pin_contact(
     tangential = coefficient * normal
     push = outward.times(normal).plus(along.times(tangential))
     forces: dict[int, Scalar] = {}
-    for i, partial in hole.shifted(bearing, outward.times(wall)).partials.items():
+    for i, partial in hole.shifted(bearing, touch.arm).partials.items():
         forces[i] = partial.dot(push)
-    for i, partial in shaft.shifted(journal, outward.times(inside)).partials.items():
+    for i, partial in shaft.shifted(journal, outward.times(touch.inside)).partials.items():
         forces[i] = forces.get(i, 0.0) - partial.dot(push)
+    if worn is not None:
+        couple = pressing * touch.couple
+        for frame, sign in ((hole, -1.0), (shaft, 1.0)):
+            for i, weight in frame.angle_partials.items():
+                forces[i] = forces.get(i, 0.0) + sign * weight * couple
     touching = depth > 0.0
     indentation = select(touching, depth, 0.0)
     spring = elastic_force(indentation, contact.stiffness)
     return PinContact(
-        gap=gap,
+        gap=journal.position.minus(bearing.position),
         depth=depth,
         rate=rate,
         normal=normal,
         memory=ContactMemory(select(touching, 1.0, 0.0), speed),
         deflection_rate=deflection_rate,
         forces=forces,
-        losses=((normal - spring) * rate, tangential * surface_slip),
+        losses=((pressing - spring) * rate, tangential * surface_slip),
         stored=0.4 * spring * indentation,
     )

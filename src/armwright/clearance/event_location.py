@@ -11,7 +11,7 @@ All lanes make the parts together; those without an impact are reset, so that th
 The functions are emitted for a linkage, see ``lane_layout``. What they share: ``x``, ``y``, ``state`` and ``change``
 are those of the loop; ``table`` holds the drives and ``h`` is the length of the step; ``done`` (LANES,) is the fraction
 of the step that each lane has completed, ``part`` (LANES,) the fraction it makes next, and ``hit`` (LANES,) the pin
-with an impact in it, or -1.
+with an impact in it, or -1; ``walls`` are those of worn pins.
 """
 
 from __future__ import annotations
@@ -49,6 +49,7 @@ def resolve_impacts(
     table: Array,
     lengths: Array,
     step: int,
+    walls: Array,
     counts: Integers,
     row: Integers,
     runs: int,
@@ -60,12 +61,12 @@ def resolve_impacts(
     for _ in range(PINS):
         if find_impacts(x, y, depths, done, part, hit, h) == 0:
             break
-        locate_impacts(x, y, state, before, after, change, depths, done, part, hit, table, step - 1, h)
+        locate_impacts(x, y, state, before, after, change, depths, done, part, hit, table, step - 1, h, walls)
         for k in range(LANES):
             if hit[k] >= 0 and k < runs:
                 counts[row[k], hit[k]] += 1
             ending[k] = 1.0 if step == steps else 0.0
-        evaluate(x, y, state, table, min(step, steps - 1), ending)
+        evaluate(x, y, state, table, min(step, steps - 1), ending, walls)
 
 
 def set_drives(x: Array, table: Array, step: int, k: int, moment: float) -> None:
@@ -76,17 +77,26 @@ def set_drives(x: Array, table: Array, step: int, k: int, moment: float) -> None
         x[(FIRST_DRIVE + i) * LANES + k] = a + moment * (c - a - bent + moment * bent)
 
 
-def evaluate(x: Array, y: Array, state: Array, table: Array, step: int, moment: Array) -> None:
+def evaluate(x: Array, y: Array, state: Array, table: Array, step: int, moment: Array, walls: Array) -> None:
     """Evaluate the equations at the state, each lane at its own fraction of a step."""
     for k in range(LANES):
         set_drives(x, table, step, k, moment[k])
     for j in range(STATES * LANES):
         x[j] = state[j]
-    rates(x, y)
+    rates(x, y, walls)
 
 
 def make_part(
-    x: Array, y: Array, state: Array, change: Array, table: Array, step: int, h: float, done: Array, part: Array
+    x: Array,
+    y: Array,
+    state: Array,
+    change: Array,
+    table: Array,
+    step: int,
+    h: float,
+    done: Array,
+    part: Array,
+    walls: Array,
 ) -> None:
     """Integrate each lane over its part of a step."""
     for stage in range(STAGES):
@@ -97,7 +107,7 @@ def make_part(
             for k in range(LANES):
                 j = i * LANES + k
                 x[j] = state[j] + (ahead * h * part[k] * y[j] if stage > 0 else 0.0)
-        rates(x, y)
+        rates(x, y, walls)
         if RK4:
             weight = 1.0 if stage in {0, 3} else 2.0
             for j in range(STATES * LANES):
@@ -170,16 +180,17 @@ def locate_impacts(
     table: Array,
     step: int,
     h: float,
+    walls: Array,
 ) -> None:
     """Repeat a step from the state ``before``, up to the impacts and from there to its end."""
     after[:] = state
     moment = np.zeros(LANES)
     for correction in range(2):
         state[:] = before
-        make_part(x, y, state, change, table, step, h, done, part)
+        make_part(x, y, state, change, table, step, h, done, part, walls)
         for k in range(LANES):
             moment[k] = done[k] + part[k]
-        evaluate(x, y, state, table, step, moment)
+        evaluate(x, y, state, table, step, moment, walls)
         if correction == 0:
             correct(y, done, part, hit, h)
     for k in range(LANES):
@@ -193,7 +204,7 @@ def locate_impacts(
                 depths[i * LANES + k] = y[(FIRST_DEPTH + i) * LANES + k]
             for i in range(STATES):
                 before[i * LANES + k] = state[i * LANES + k]
-    make_part(x, y, state, change, table, step, h, done, part)
+    make_part(x, y, state, change, table, step, h, done, part, walls)
     for k in range(LANES):
         if hit[k] < 0:
             for i in range(STATES):

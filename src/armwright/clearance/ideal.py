@@ -183,12 +183,14 @@ def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple
 
 def effects(placement: Placement) -> Array:
     """Return (..., n, d + 2 p) the generalised forces of unit efforts, and of unit forces on the bearings."""
-    linkage = placement.linkage
+    linkage, n = placement.linkage, len(placement.q)
     d, p = len(linkage.drives), len(linkage.pins)
-    A = np.zeros((*np.shape(placement.q[0]), len(placement.q), d + 2 * p))
+    A = np.zeros((*np.shape(placement.q[0]), n, d + 2 * p))
     for k, drive in enumerate(linkage.drives):
-        for i, weight in drive_weights(placement, drive.body).items():
-            A[..., i, k] = weight
+        for i, weight in drive_weights(linkage, drive.body).items():
+            # Straight rods have no coordinates.
+            if i < n:
+                A[..., i, k] = weight
     for k in range(p):
         for i, partial in _gap(placement, k).partials.items():
             A[..., i, d + 2 * k] = -partial.x

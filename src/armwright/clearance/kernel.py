@@ -9,17 +9,28 @@ import ast
 import hashlib
 import inspect
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from types import ModuleType
 from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
 
-from armwright.clearance import event_location, simulation_loop
-from armwright.clearance.equations import ROD_WORKS, WORKS, Contact, ContactMemory, FrictionModel, State, rates
+from armwright.clearance import event_location, simulation_loop, wall_lookup
+from armwright.clearance.equations import (
+    ROD_WORKS,
+    WORKS,
+    Contact,
+    ContactMemory,
+    FrictionModel,
+    State,
+    Wall,
+    pin_place,
+    rates,
+)
 from armwright.clearance.lane_layout import LANES
 from armwright.clearance.linkage import Linkage, Material
+from armwright.clearance.placement import Placement
 from armwright.tracing.emit import emit_lanes
 from armwright.tracing.native import processor
 from armwright.tracing.scalar import Scalar
@@ -33,8 +44,8 @@ CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 _SIGNATURE = """SIGNATURE = types.void(
     int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True),
     types.Array(float64, 1, "C", readonly=True), types.Array(int64, 1, "C", readonly=True),
-    types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
-    types.Array(int64, 1, "C"),
+    types.Array(float64, 3, "C", readonly=True), types.Array(float64, 3, "C"), types.Array(int64, 2, "C"),
+    types.Array(float64, 2, "C"), types.Array(int64, 1, "C"),
 )
 """
 _COMPILED = '@njit(error_model="numpy")'
@@ -57,12 +68,14 @@ class Layout:
         friction: the friction model.
         control: of the drives.
         located: whether impacts are located within a step; see ``event_location``.
+        worn: whether the walls of the pins are worn; see ``worn_walls``.
     """
 
     linkage: Linkage = attrs.field(eq=_kernel_key)
     friction: FrictionModel
     control: Control
     located: bool = False
+    worn: bool = False
 
     @property
     def n(self) -> int:
@@ -104,8 +117,13 @@ class Layout:
         """The length of a sample: the state, and the force of each pin."""
         return self.states + self.pins
 
-    def unpack(self, x: Sequence[Scalar]) -> tuple[State, list[Scalar], list[Contact]]:
-        """Return state, drives and contacts of a row of numbers."""
+    @property
+    def wall_numbers(self) -> int:
+        """The length of what is looked up of worn walls."""
+        return len(Wall._fields) * self.pins if self.worn else 0
+
+    def unpack(self, x: Sequence[Scalar]) -> tuple[State, list[Scalar], list[Contact], list[Wall]]:
+        """Return state, drives, contacts and worn walls of a row of numbers."""
         numbers = iter(x)
 
         def take(count: int) -> list[Scalar]:
@@ -116,9 +134,10 @@ class Layout:
         take(len(self.works))
         impacts = [(take(1)[0], take(1)[0]) for _ in range(self.pins)]
         contacts = [Contact(*take(len(Contact._fields))) for _ in range(self.pins)]
-        gains, columns = take(self.gains), take(self.columns)
+        gains, columns, looked_up = take(self.gains), take(self.columns), take(self.wall_numbers)
+        walls = [Wall(*looked_up[i : i + 3]) for i in range(0, len(looked_up), 3)]
         memories = [ContactMemory(*pair, bend) for pair, bend in zip(impacts, deflections, strict=True)]
-        return State(q, qd, memories), self._drives(q, qd, gains, columns), contacts
+        return State(q, qd, memories), self._drives(q, qd, gains, columns), contacts, walls
 
     def _drives(
         self, q: Sequence[Scalar], qd: Sequence[Scalar], gains: Sequence[Scalar], columns: Sequence[Scalar]
@@ -134,13 +153,19 @@ class Layout:
 
     def rates(self, x: Sequence[Scalar]) -> list[Scalar]:
         """Return the rates of the state, memory and force of each pin, and, where located, depths and their rates."""
-        state, drives, contacts = self.unpack(x)
-        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts)
+        state, drives, contacts, walls = self.unpack(x)
+        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts, walls=walls)
         pins = linkage_rates.pins
         bristles = [pin.deflection_rate for pin in pins][: self.deflections]
         impacts = [x for pin in pins for x in (pin.memory.touching, pin.memory.speed, pin.normal)]
         depths = [x for pin in pins for x in (pin.depth, pin.rate)] if self.located else []
         return [*state.qd, *linkage_rates.qdd, *bristles, *linkage_rates.powers, *impacts, *depths]
+
+    def places(self, x: Sequence[Scalar]) -> list[Scalar]:
+        """Return of each pin the direction of its gap and the rotation of its journal [rad]."""
+        state = self.unpack(x)[0]
+        placement = Placement(self.linkage, state.q, state.qd)
+        return [angle for pin in self.linkage.pins for angle in pin_place(placement, pin)]
 
 
 class SimulationCode(NamedTuple):
@@ -148,36 +173,48 @@ class SimulationCode(NamedTuple):
 
     Attributes:
         source: of ``simulate``, Python for Numba.
-        equations: LLVM IR of ``lanes``, the equations of the linkage.
-        symbol: the name under which the source finds them.
+        equations: LLVM IR of each ``lanes`` of the linkage, by the name under which the source finds it.
     """
 
     source: str
-    equations: str
-    symbol: str
+    equations: Mapping[str, str]
 
 
-_HEAD = """import numpy as np
+_HEAD = """from math import floor
+
+import numpy as np
 from numba import float64, int64, njit, types
 
-lanes = types.ExternalFunction("{symbol}", types.void(types.uintp, types.uintp))
 """
+_LANES = """{name} = types.ExternalFunction("{symbol}", types.void(types.uintp, types.uintp))"""
 _RATES = """@njit(error_model="numpy")
-def rates(x, y):
+def rates(x, y, walls):
+    lanes(x.ctypes.data, y.ctypes.data)"""
+# First where the pins are, then how far their walls are there, then all else.
+_WORN_RATES = """@njit(error_model="numpy")
+def rates(x, y, walls):
+    places(x.ctypes.data, y.ctypes.data)
+    look_up_walls(x, y, walls)
     lanes(x.ctypes.data, y.ctypes.data)"""
 
 
 def emit_simulation(layout: Layout, integrator: Integrator) -> SimulationCode:
     """Write the code of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
     sizes = _layout_sizes(layout, integrator)
-    equations = emit_lanes(layout.rates, sizes["INPUTS"], LANES, processor().target)
-    symbol = f"armwright_{hashlib.sha256(equations.ir.encode()).hexdigest()}"
+    functions = {"lanes": layout.rates, "places": layout.places} if layout.worn else {"lanes": layout.rates}
+    emitted = {
+        name: emit_lanes(function, sizes["INPUTS"], LANES, processor().target) for name, function in functions.items()
+    }
+    symbols = {name: f"armwright_{hashlib.sha256(one.ir.encode()).hexdigest()}" for name, one in emitted.items()}
+    outputs = {"OUTPUTS": emitted["lanes"].outputs, "FARTHEST_CELL": wall_lookup.FARTHEST_CELL}
+    rates_of_walls = [*_function_sources(wall_lookup, _COMPILED), _WORN_RATES] if layout.worn else [_RATES]
     events = _function_sources(event_location, _COMPILED) if layout.located else []
     source = "\n\n".join(
         [
-            _HEAD.format(symbol=symbol),
-            "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": equations.outputs}.items()),
-            _RATES,
+            _HEAD,
+            "\n".join(_LANES.format(name=name, symbol=symbol) for name, symbol in symbols.items()),
+            "\n".join(f"{name} = {value!r}" for name, value in {**sizes, **outputs}.items()),
+            *rates_of_walls,
             *events,
             *_function_sources(simulation_loop, _INLINED),
             _SIGNATURE.format(matrix='types.Array(float64, 2, "C", readonly=True)'),
@@ -185,7 +222,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> SimulationCode:
             "",
         ]
     )
-    return SimulationCode(source, equations.ir, symbol)
+    return SimulationCode(source, {symbols[name]: one.ir for name, one in emitted.items()})
 
 
 def _function_sources(module: ModuleType, decorator: str) -> list[str]:
@@ -230,7 +267,8 @@ def _layout_sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:
         "FIRST_PARAMETER": first_parameter,
         "FIRST_GAIN": first_gain,
         "FIRST_DRIVE": first_drive,
-        "INPUTS": first_drive + layout.columns,
+        "FIRST_WALL": first_drive + layout.columns,
+        "INPUTS": first_drive + layout.columns + layout.wall_numbers,
         "FIRST_DEPTH": layout.states + 3 * layout.pins,
         "RK4": integrator == "rk4",
         "STAGES": 4 if integrator == "rk4" else 1,

@@ -30,7 +30,9 @@ FIRST_MEMORY = STATES
 FIRST_PARAMETER = FIRST_MEMORY + MEMORY
 FIRST_GAIN = FIRST_PARAMETER + PARAMETERS
 FIRST_DRIVE = FIRST_GAIN + GAINS
-INPUTS = FIRST_DRIVE + COLUMNS
+# Of each pin with a worn wall its growth and two derivatives of that.
+FIRST_WALL = FIRST_DRIVE + COLUMNS
+INPUTS = FIRST_WALL
 # Outputs: the rates of the state; of each pin whether it touches, the velocity it came with, and the normal force;
 # behind them, with events located, its depth and the rate of that.
 FIRST_DEPTH = STATES + 3 * PINS
@@ -42,11 +44,12 @@ STAGES = 4
 LOCATED = False
 
 
-def rates(x: Array, y: Array) -> None:
+def rates(x: Array, y: Array, walls: Array) -> None:
     """Evaluate the equations of the linkage for all lanes.
 
     Args:
         x: (INPUTS · LANES,) state, memory, parameters, gains and drives.
         y: (OUTPUTS · LANES,) to fill.
+        walls: those of worn pins, see ``wall_lookup``; empty where pins are round.
     """
     raise NotImplementedError("the equations come with a linkage")

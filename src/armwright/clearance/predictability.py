@@ -18,6 +18,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.simulation import Simulation, simulate
+from armwright.clearance.worn_walls import WornWalls
 from armwright.errors import InvalidValueError
 
 # The difference of the clearances of indistinguishable runs [m], and how many of them beside the first fill a vector.
@@ -58,7 +59,12 @@ def perturb_clearances(clearances: Array, count: int = MAX_REPLICATES) -> Array:
 
 
 def simulate_with_predictability(
-    scenario: Scenario, clearances: Array, *, friction: float | None = None, threads: int | None = None
+    scenario: Scenario,
+    clearances: Array,
+    *,
+    friction: float | None = None,
+    threads: int | None = None,
+    worn: WornWalls | None = None,
 ) -> tuple[Simulation, Predictability]:
     """Return a run, bit by bit that of ``simulate`` alone, and its predictability.
 
@@ -67,19 +73,21 @@ def simulate_with_predictability(
         clearances: (p,) of the pins [m].
         friction: coefficient of friction; that of the material when left out.
         threads: how many cores to use.
+        worn: the walls of its pins, where they are worn.
 
     Raises:
         InvalidValueError: see ``simulate``.
     """
     rows = perturb_clearances(np.asarray(clearances, dtype=np.float64))
-    own = simulate(scenario, rows, frictions=friction, threads=threads)
+    own = simulate(scenario, rows, frictions=friction, threads=threads, worn=worn)
     smaller_steps = []
     for parts in STEP_DIVISORS:
         settings = attrs.evolve(scenario.settings, step=scenario.h / parts, sample=scenario.stride * scenario.h)
         # The steps may be more than the limit.
         with contextlib.suppress(InvalidValueError):
             again = prepare_scenario(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
-            smaller_steps.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
+            finer_run = simulate(again, rows, frictions=friction, threads=threads, worn=worn)
+            smaller_steps.append(finer_run.error[:, : len(own.time)])
     complete = [error.shape for error in smaller_steps] == [own.error.shape] * len(STEP_DIVISORS)
     finer = np.concatenate(smaller_steps) if complete else None
     return select_run(own, 0), _predictability(own.time, own.error, finer)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, leading_axes
+from armwright.arrays import Array, ArrayLike, floats, leading_axes, of_shape
 from armwright.clearance.contact import damping
 from armwright.clearance.ideal import pin_gaps, tip_position
 from armwright.clearance.kernel import Integrator, Layout, emit_simulation
@@ -22,6 +22,7 @@ from armwright.clearance.linkage import Linkage
 from armwright.clearance.scenario import Scenario
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.clearance.worn_walls import WornWalls
 from armwright.errors import InvalidValueError
 from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores_for_long
@@ -57,6 +58,7 @@ class Simulation:
         impacts: (..., p) the number of impacts of each journal.
         peaks: (..., p) the largest force in each pin [N].
         status: (...) how each run ended.
+        worn: the walls of its pins; None where they are round.
     """
 
     scenario: Scenario
@@ -72,6 +74,7 @@ class Simulation:
     impacts: Integers
     peaks: Array
     status: Integers
+    worn: WornWalls | None = None
 
     @property
     def distance(self) -> Array:
@@ -86,8 +89,21 @@ class Simulation:
     @property
     def depths(self) -> Array:
         """(..., s, p) indentation of each journal into its wall; below 0 in free flight [m]."""
-        size = np.linalg.norm(self.gaps, axis=-1)
-        return np.asarray(size - self.clearances[..., None, :], dtype=np.float64)
+        return self.contact_geometry(self.gaps)[0]
+
+    @property
+    def stiffness(self) -> Array:
+        """(..., p) K of the contacts [N/m^1.5]."""
+        return contact_stiffness(self.scenario.linkage, mean_clearances(self.clearances, self.worn))
+
+    def contact_geometry(self, gaps: Array) -> tuple[Array, Array]:
+        """Return (..., s, p) depths [m] and (..., s, p, 2) outward gradients of them at gaps (..., s, p, 2)."""
+        clearances = self.clearances[..., None, :]
+        if self.worn is not None:
+            return self.worn.gradients(self.scenario.linkage, self.q, gaps, clearances)
+        size = np.linalg.norm(gaps, axis=-1)
+        outward = gaps / np.maximum(size, np.finfo(float).tiny)[..., None]
+        return np.asarray(size - clearances, dtype=np.float64), outward
 
 
 class Record(NamedTuple):
@@ -103,7 +119,9 @@ def simulate(
     clearances: ArrayLike | None = None,
     *,
     frictions: ArrayLike | None = None,
+    initial: tuple[ArrayLike, ArrayLike] | None = None,
     threads: int | None = None,
+    worn: WornWalls | None = None,
 ) -> Simulation:
     """Simulate a linkage with clearance, driven as one without would be for its path.
 
@@ -111,7 +129,9 @@ def simulate(
         scenario: the prepared path; see ``prepare``.
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
+        initial: (..., n) coordinates and speeds from which the runs start; when left out, those of the settings.
         threads: how many cores to use; all when left out. The bits do not depend on it.
+        worn: walls of pins of these clearances, where they are worn.
 
     Raises:
         InvalidValueError: a clearance is not above 0, or the step is too long for the contacts.
@@ -120,26 +140,39 @@ def simulate(
     linkage, settings = scenario.linkage, scenario.settings
     c, mu = _broadcast_parameters(linkage, clearances, frictions)
     lead = mu.shape
-    K = contact_stiffness(linkage, c)
+    K = contact_stiffness(linkage, mean_clearances(c, worn))
     check_step(linkage, settings, K)
-    layout = Layout(linkage=linkage, friction=settings.friction, control=settings.control, located=settings.located)
+    layout = Layout(
+        linkage=linkage,
+        friction=settings.friction,
+        control=settings.control,
+        located=settings.located,
+        worn=worn is not None,
+    )
     start = np.zeros((*lead, layout.states))
-    start[..., : layout.n] = initial_coordinates(scenario, c, K)
-    start[..., layout.n : layout.n + scenario.ideal.qd.shape[-1]] = scenario.ideal.qd[0]
+    q, qd = initial or (initial_coordinates(scenario, c, K, worn), initial_speeds(scenario))
+    start[..., : layout.n] = of_shape(q, (layout.n,), "initial coordinates")
+    start[..., layout.n : 2 * layout.n] = of_shape(qd, (layout.n,), "initial speeds")
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
-    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, threads)
-    return _unpack_record(scenario, layout, c, mu, record)
+    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, worn=worn, threads=threads)
+    return attrs.evolve(_unpack_record(scenario, layout, c, mu, record), worn=worn)
 
 
-def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Array:
+def mean_clearances(clearances: Array, worn: WornWalls | None) -> Array:
+    """Return (..., p) clearances with what has gone from the surfaces on average, by which contacts are stiff [m]."""
+    return clearances if worn is None else clearances + worn.means
+
+
+def initial_coordinates(scenario: Scenario, clearances: Array, K: Array, worn: WornWalls | None = None) -> Array:
     """Return (..., n) the coordinates from which runs start; elastic rods are bent as they are at rest.
 
     Args:
         scenario: the prepared path.
         clearances: (..., p) [m].
         K: (..., p) stiffness of the contacts [N/m^1.5].
+        worn: the walls of the pins, where they are worn.
     """
     ideal = scenario.ideal.q[0]
     if scenario.settings.start == "centred":
@@ -147,7 +180,13 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Arra
             return find_static_equilibrium(scenario.linkage, ideal, np.zeros_like(clearances)).q
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
     elastic = None if scenario.settings.start == "rigid" else K
-    return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic).q
+    return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic, worn).q
+
+
+def initial_speeds(scenario: Scenario) -> Array:
+    """Return (n,) the speeds from which runs start: those of the path, and rods that do not move in their frames."""
+    qd = scenario.ideal.qd[0]
+    return np.concatenate([qd, np.zeros(len(scenario.linkage.coordinates) - len(qd))])
 
 
 def _broadcast_parameters(
@@ -164,8 +203,17 @@ def _broadcast_parameters(
     return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
 
 
-def _run_lanes(scenario: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
+def _run_lanes(
+    scenario: Scenario,
+    layout: Layout,
+    start: Array,
+    contacts: Array,
+    *,
+    worn: WornWalls | None,
+    threads: int | None,
+) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
+    walls = np.zeros((0, 0, 0)) if worn is None else worn.table
     runs, pins, rows = len(start), layout.pins, len(scenario.table)
     marks = scenario.marks[: rows + 1]
     samples = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)
@@ -177,7 +225,7 @@ def _run_lanes(scenario: Scenario, layout: Layout, start: Array, contacts: Array
     gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
     run = _compiled_kernel(layout, scenario.settings.integrator)
     lengths = scenario.lengths[:rows]
-    inputs = (start, contacts, gains, scenario.table, lengths, samples, *record)
+    inputs = (start, contacts, gains, scenario.table, lengths, samples, walls, *record)
     on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
     return record
 
@@ -187,7 +235,8 @@ def _compiled_kernel(layout: Layout, integrator: Integrator) -> Any:
     from armwright.tracing.from_numba import announce  # noqa: PLC0415 - Numba takes half a second
 
     code, title = emit_simulation(layout, integrator), f"the simulation of {layout.linkage.name}"
-    announce(code.symbol, function_address(code.equations, "lanes"))
+    for symbol, equations in code.equations.items():
+        announce(symbol, function_address(equations, "lanes"))
     return compiled(code.source, "simulate", title)
 
 

@@ -46,6 +46,7 @@ def simulate(
     table: Array,
     lengths: Array,
     sample_at: Integers,
+    walls: Array,
     samples: Array,
     counts: Integers,
     peaks: Array,
@@ -62,6 +63,7 @@ def simulate(
         table: (steps, 3, COLUMNS) the drives at the start, the middle and the end of each step.
         lengths: (steps,) of the steps [s].
         sample_at: (steps + 1,) the number of the sample that is taken at each step, or -1.
+        walls: those of worn pins; empty where pins are round.
         samples: (runs, ..., STATES + PINS) to fill: states, and the normal force of each pin.
         counts: (runs, PINS) to fill: impacts.
         peaks: (runs, PINS) to fill: largest normal forces.
@@ -87,12 +89,12 @@ def simulate(
             h = lengths[now]
             for stage in range(STAGES):
                 begin_stage(stage, step, now, h, x, y, state, table)
-                rates(x, y)
+                rates(x, y, walls)
                 if stage == 0:
                     if LOCATED:
                         if step > 0:
                             lanes = (x, y, state, before, after, change, depths, done, part, hit)
-                            resolve_impacts(*lanes, table, lengths, step, counts, row, last - begin)
+                            resolve_impacts(*lanes, table, lengths, step, walls, counts, row, last - begin)
                         before[:] = state
                         for j in range(2 * PINS * LANES):
                             depths[j] = y[FIRST_DEPTH * LANES + j]

@@ -2,8 +2,8 @@
 
 Without friction the force in each pin acts through the centres of bearing and journal. So a journal is displaced in the
 direction of the force that it carries, and indents the wall as that force requires; direction and geometry depend a
-little on each other, and a few iterations find both. Where rods are elastic, all this and the balance of their springs
-are solved together by Newton's method.
+little on each other, and a few iterations find both. On a worn wall it lies where the wall is normal to the force.
+Where rods are elastic, all this and the balance of their springs are solved together by Newton's method.
 
 Source:
     Spec of the clearance, 0.1 and 4.3.
@@ -15,6 +15,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.equations import free_forces, rod_springs
 from armwright.clearance.ideal import (
     close_pins,
@@ -27,6 +28,7 @@ from armwright.clearance.ideal import (
     tip_position,
 )
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.worn_walls import WornWalls
 from armwright.errors import InvalidValueError
 
 _MAX_ITERATIONS = 60
@@ -58,7 +60,11 @@ class StaticEquilibrium:
 
 
 def find_static_equilibrium(
-    linkage: Linkage, ideal: ArrayLike, clearances: ArrayLike | None = None, stiffness: ArrayLike | None = None
+    linkage: Linkage,
+    ideal: ArrayLike,
+    clearances: ArrayLike | None = None,
+    stiffness: ArrayLike | None = None,
+    worn: WornWalls | None = None,
 ) -> StaticEquilibrium:
     """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
 
@@ -67,9 +73,11 @@ def find_static_equilibrium(
         ideal: (..., n) coordinates with closed pins, at which the drives are locked.
         clearances: (..., p) [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5]; rigid ones when left out.
+        worn: walls of pins of these clearances, where they are worn.
 
     Raises:
-        InvalidValueError: a pin carries no force, so that its journal may lie anywhere, or the linkage is singular.
+        InvalidValueError: a pin carries no force, so that its journal may lie anywhere; the linkage is singular; walls
+            are worn, and bodies elastic.
         ShapeError: an array does not fit.
     """
     start = floats(ideal, "ideal")
@@ -85,7 +93,10 @@ def find_static_equilibrium(
     for _ in range(_MAX_ITERATIONS):
         _, reactions = inverse_dynamics(linkage, q, still, still)
         size = force_magnitudes(linkage, reactions)
-        gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
+        if worn is None:
+            gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
+        else:
+            gaps = worn.resting_gaps(linkage, q, reactions, c, K)
         new = close_pins(linkage, q, drives=drives, gaps=gaps)
         moved = np.abs(new - q).max(axis=-1, keepdims=True)
         q = np.where(converged, q, new)
@@ -96,6 +107,8 @@ def find_static_equilibrium(
     if np.any(~converged & (moved > _ROUNDING)):
         raise _no_equilibrium(linkage, moved)
     if linkage.rods:
+        if worn is not None:
+            refuse_rods("worn walls", linkage.rods)
         q, size = _with_elastic_rods(linkage, q, drives, c, np.broadcast_to(np.asarray(K), c.shape))
     return StaticEquilibrium(q=q, tip=tip_position(linkage, q), gaps=pin_gaps(linkage, q), forces=size)
 

@@ -22,6 +22,13 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None,
         Option(help="Standard deviation of a measured coordinate; by default that of repeated readings."),
     ] = None,
+    friction: Annotated[
+        float | None,
+        Option(
+            help="At rest: coefficient of friction, which holds journals anywhere in their friction cones; the default "
+            "is that of the linkage, and 0 leaves it out."
+        ),
+    ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     output: OutputFolder = None,
@@ -47,7 +54,9 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     measurement = read_clearance_measurements(measured, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     noise = None if noise_um is None else noise_um * 1e-6
     if isinstance(measurement, RestMeasurement):
-        assessment = assess_rest(model, measurement, noise)
+        assessment = assess_rest(model, measurement, noise, friction=friction)
+    elif friction is not None:
+        raise usage_error("--friction", "expected readings at rest; on paths friction is that of the sweep")
     elif sweep is None:
         raise usage_error("--sweep", "measurements on paths need a sweep to compare with: `armwright clearance sweep`")
     elif noise is None:

@@ -1,11 +1,12 @@
 """``armwright clearance simulate``: simulate a linkage with joint clearance along a path."""
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, path_of, settings_of, with_clearances
-from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
@@ -57,6 +58,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         Literal["rest", "rigid", "centred"],
         Option(help="Initial state: rest on elastic bearings, rest on rigid ones, or centred."),
     ] = "rest",
+    worn: Annotated[
+        Path | None, Option(help="wear.json of `armwright clearance wear -o`: the pins are as worn as there.")
+    ] = None,
+    strokes: Annotated[
+        float | None, Option(help="With --worn: how many strokes they have made; the default is the last.")
+    ] = None,
     output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -70,6 +77,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
 
     **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --revolutions 2 --step 2e-6`
+
+    **Example:** `armwright clearance simulate five-bar --path y1 --worn out/worn/wear.json --strokes 1e6`
     """
     import numpy as np
 
@@ -77,8 +86,13 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.predictability import simulate_with_predictability
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.scenario import prepare_scenario
+    from armwright.clearance.wear.life_file import read_worn_surfaces
+    from armwright.clearance.worn_walls import WornWalls
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
+    if strokes is not None and worn is None:
+        raise usage_error("--strokes", "expected --worn beside it")
+    surfaces, made = (None, None) if worn is None else read_worn_surfaces(worn, model, strokes)
     tip_path = path_of(model, path, speed_rpm, revolutions)
     settings = settings_of(
         friction_velocity,
@@ -94,7 +108,9 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     with waiting(f"{model.name}: the first run compiles it", quiet=quiet or as_json):
         scenario, clearances = prepare_scenario(model, tip_path, settings), np.array(list(model.clearances.values()))
-        run = ClearanceRun.of(*simulate_with_predictability(scenario, clearances, friction=friction))
+        walls = None if surfaces is None else WornWalls.of(model, surfaces.bearing, surfaces.journal)
+        runs = simulate_with_predictability(scenario, clearances, friction=friction, worn=walls)
+        run = ClearanceRun.of(*runs, strokes=made)
     if output is not None:
         from armwright.report.clearance_run_files import clearance_run_files
 

@@ -40,6 +40,10 @@ def wear(  # noqa: PLR0917 - Typer reads one parameter per option
     limit_ap: Annotated[float | None, Option("--limit-ap", help="Limit of AP of ISO 9283 in mm.")] = None,
     limit_path: Annotated[float | None, Option("--limit-path", help="Limit of the error along the path in mm.")] = None,
     steps: Annotated[int, Option(help="Number of extrapolated steps, each of at most 2 % of a clearance.")] = 20,
+    simulate_after: Annotated[
+        list[float] | None,
+        Option(help="Strokes after which one is simulated with its impacts, beside the first and last; repeatable."),
+    ] = None,
     output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -48,7 +52,9 @@ def wear(  # noqa: PLR0917 - Typer reads one parameter per option
 
     Journals and bearings lose height after Archard's law where the motion presses and rubs them. Many strokes are
     extrapolated in one step; the life is computed twice, the second time with steps of half the depth, and the
-    difference is printed. With -o, report.html shows the worn profiles, magnified, and the errors over the strokes.
+    difference is printed. The first and the last stroke are also simulated with their impacts, the last on worn walls.
+    With -o, report.html shows the worn profiles, magnified, and the errors over the strokes, and wear.json holds them
+    for `armwright clearance simulate --worn`.
 
     **Example:** `armwright clearance wear five-bar --path y1 --k 1e-5 --limit-rp 0.04 -o out/worn`
     """
@@ -76,6 +82,7 @@ def wear(  # noqa: PLR0917 - Typer reads one parameter per option
             spread=k_spread,
             limits={name: limit * 1e-3 for name, limit in limits.items() if limit is not None},
             steps=steps,
+            simulate_after=simulate_after or (),
             progress=progress,
         )
     if output is not None:

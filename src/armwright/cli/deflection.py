@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
+from armwright.cli.gear_options import gear_values
 from armwright.cli.numbers import numbers
 from armwright.cli.options import ArmName, Configuration, Json, OutputFolder, Rows, usage_error
 from armwright.cli.output import command_line, print_result
@@ -18,17 +19,18 @@ if TYPE_CHECKING:
 
 def deflection(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    stiffness: Annotated[
-        str,
-        Option(
-            help="Stiffness of the joints: a TOML file about three axes (docs/calibration.md), or numbers about their "
-            "own axes in N m/rad and N/m, one for all or one per joint."
-        ),
-    ],
     q: Configuration = None,
     csv: Rows = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
+    stiffness: Annotated[
+        str | None,
+        Option(
+            help="Stiffness of the joints: a TOML file about three axes (docs/calibration.md), or numbers about their "
+            "own axes in N m/rad and N/m, one for all or one per joint, inf is rigid; that of the gears of the arm "
+            "file when left out."
+        ),
+    ] = None,
     load: Load = None,
     wrench: Annotated[
         str | None,
@@ -68,21 +70,18 @@ def deflection(  # noqa: PLR0917 - Typer reads one parameter per option
     print_result(assessment, as_json=as_json, output=output)
 
 
-def _compliance(arm: "Arm", text: str) -> "Array":
+def _compliance(arm: "Arm", text: str | None) -> "Array":
     """Return the compliance (n, 3) of the joints of an arm."""
     import numpy as np
 
     from armwright.arm.load import is_path
-    from armwright.dynamics.stiffness_file import LARGEST_STIFFNESS, LEAST_STIFFNESS, read_stiffness
+    from armwright.dynamics.stiffness_file import read_stiffness
 
-    if is_path(text):
+    if text is not None and is_path(text):
         return read_stiffness(text, arm)
-    count = 1 if "," not in text else arm.n
+    gears = arm.motor_values("stiffness") if text is None else np.array(gear_values(text, arm.n, "--stiffness"))
+    if np.all(np.isinf(gears)):
+        raise usage_error("--stiffness", f"expected a stiffness: the gears of {arm.name} are rigid")
     compliance = np.zeros((arm.n, 3))
-    values = np.array(numbers(text, count, "--stiffness"))
-    for value in values.tolist():
-        if not LEAST_STIFFNESS <= value <= LARGEST_STIFFNESS:
-            expected = f"numbers from {LEAST_STIFFNESS:g} to {LARGEST_STIFFNESS:g}"
-            raise usage_error("--stiffness", f"expected {expected}, or a file that ends in .toml, got {value:g}")
-    compliance[:, 2] = 1 / values
+    compliance[:, 2] = 1 / gears
     return compliance

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Option
 
+from armwright.cli.gear_options import Damping, Stiffness, with_gears_of
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
-from armwright.cli.vibration import Damping, Stiffness, with_gears_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

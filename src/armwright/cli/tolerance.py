@@ -50,7 +50,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright tolerance puma560 examples/puma_tolerances.toml -q 10,-20,30,0,40,0 --limit 0.5`
     """
     from armwright.arm.load import load_arm
-    from armwright.reliability.assessment import assess_tolerances
+    from armwright.reliability.arm_errors import assess_tolerances
     from armwright.reliability.tolerances import read_tolerances
     from armwright.report.tolerance_files import tolerance_files
 

@@ -1,27 +1,17 @@
 """``armwright vibration``: natural frequencies, compliance and deflection of an arm with flexible gears."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from typer import Argument, Option
 
+from armwright.cli.gear_options import Damping, Stiffness, with_gears_of
 from armwright.cli.numbers import numbers, within
 from armwright.cli.options import ArmName, Configuration, Json, OutputFolder, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.results import write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, columns_of
 from armwright.cli.tool_options import Load, read_payload
-
-if TYPE_CHECKING:
-    from armwright.arm.model import Arm
-
-Stiffness = Annotated[
-    str | None,
-    Option(help="Stiffness of the gears in N m/rad and N/m, one for all or one per joint; inf is rigid."),
-]
-Damping = Annotated[
-    str | None, Option(help="Damping of the gears in N m s/rad and N s/m, one for all or one per joint.")
-]
 
 # Bounds of the components of a force [N].
 _FORCE = (-1e6, 1e6)
@@ -69,32 +59,3 @@ def vibration(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         write_results(output, vibration_files(assessment, command=command_line()))
     print_result(assessment, as_json=as_json, output=output)
-
-
-def with_gears_of(arm: "Arm", stiffness: str | None, damping: str | None) -> "Arm":
-    """Return an arm with the gears that options describe; of those that are left out, with its own."""
-    from armwright.dynamics.flexible_joints import with_gears
-
-    if stiffness is None and damping is None:
-        return arm
-    values = []
-    for name, text in (("stiffness", stiffness), ("damping", damping)):
-        values.append(arm.motor_values(name).tolist() if text is None else _gears(text, arm.n, f"--{name}"))
-    return with_gears(arm, *values)
-
-
-def _gears(text: str, n: int, option: str) -> list[float]:
-    """Read one number for all gears, or one for each; ``inf`` is a rigid gear."""
-    from armwright.arm.drive import STIFFNESS
-
-    words = text.replace(",", " ").split()
-    if len(words) not in (1, n):
-        raise usage_error(option, f"expected one number, or {n}, one per joint, got {len(words)}")
-    bounds = STIFFNESS if option == "--stiffness" else (0.0, STIFFNESS[1])
-    values = [
-        float("inf")
-        if word == "inf" and option == "--stiffness"
-        else within(numbers(word, 1, option)[0], bounds, option)
-        for word in words
-    ]
-    return values * (n if len(values) == 1 else 1)

@@ -1,6 +1,6 @@
 from .allocation import Allocation as Allocation, allocate as allocate, error_bounds as error_bounds
 from .arm_errors import (
-    sampled_deviations as sampled_deviations,
+    assess_tolerances as assess_tolerances,
     sampled_errors as sampled_errors,
     tool_error as tool_error,
 )
@@ -10,15 +10,29 @@ from .arm_life import (
     RepeatedMotion as RepeatedMotion,
     assess_life as assess_life,
 )
-from .assessment import ToleranceAssessment as ToleranceAssessment, assess_tolerances as assess_tolerances
+from .assessment import Mechanism as Mechanism, ToleranceAssessment as ToleranceAssessment
 from .exceedance import exceedance as exceedance
 from .first_order import (
     form as form,
     nearest_failure as nearest_failure,
     reliability_index as reliability_index,
 )
+from .gamma_process import GammaProcess as GammaProcess, gamma_process as gamma_process
 from .life_file import LifeFile as LifeFile, PlayGrowth as PlayGrowth, read_life_file as read_life_file
 from .linear_error import Estimate as Estimate, LinearError as LinearError, fosm as fosm
+from .linkage_assessment import (
+    LinkageReliability as LinkageReliability,
+    WearStatement as WearStatement,
+    assess_linkage as assess_linkage,
+    rest_poses as rest_poses,
+)
+from .linkage_errors import RandomClearances as RandomClearances, RandomLinkage as RandomLinkage
+from .linkage_life import LinkageLife as LinkageLife
+from .linkage_tolerances import (
+    LinkageTolerances as LinkageTolerances,
+    read_linkage_tolerances as read_linkage_tolerances,
+)
+from .linkage_wear import GapGrowth as GapGrowth, WearingLinkage as WearingLinkage
 from .play_life import (
     PlayLife as PlayLife,
     WearRates as WearRates,
@@ -32,6 +46,21 @@ from .reducer_life import (
     life_hours as life_hours,
     load_of as load_of,
 )
-from .tolerances import Tolerance as Tolerance, dimensions as dimensions, read_tolerances as read_tolerances
+from .tip_errors import (
+    assess_linkage_tolerances as assess_linkage_tolerances,
+    sampled_tip_errors as sampled_tip_errors,
+)
+from .tolerances import (
+    Tolerance as Tolerance,
+    dimensions as dimensions,
+    read_tolerances as read_tolerances,
+    sampled_deviations as sampled_deviations,
+)
+from .wear_measurements import (
+    WearMeasurement as WearMeasurement,
+    measured_residuals as measured_residuals,
+    read_wear_measurements as read_wear_measurements,
+)
 from .wear_update import RatePosterior as RatePosterior, updated_rate as updated_rate
+from .weighted_draws import WeightedDraws as WeightedDraws, draw as draw
 from .worst_case import longest_sum as longest_sum

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
 from armwright.arrays import Array, positive
 from armwright.errors import InvalidValueError
+from armwright.reliability.farthest_point import farthest_point
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tolerances import Tolerance
 from armwright.reliability.worst_case import longest_sum
@@ -20,6 +21,8 @@ Rule: TypeAlias = Literal["worst-case", "statistical"]
 _RANGE = 1e6
 # A dimension that moves the tool by less than this part of what the first one does, moves it by rounding only.
 _IDLE = 1e-12
+# The mean error leaves at least this part of the limit to tolerances.
+_ROOM = 1e-6
 # The cost is above the least by at most this part, or as found within so many rounds.
 _GAP, _ROUNDS = 1e-8, 100
 _PRECISION, _STEPS = 1e-14, 1000
@@ -29,7 +32,7 @@ class Allocation(NamedTuple):
     """Tolerances of least cost.
 
     Attributes:
-        half_widths: (k,) [m] or [rad]; infinite for a dimension that moves the tool at no pose.
+        half_widths: (k,) [m, rad, kg, N]; for a dimension that moves the tool at no pose the most that it may be.
         costs: (k,) of each.
         scaled_cost: of the given tolerances, all multiplied by one factor so that the error just keeps its limit.
         least_cost: no tolerances within the limit cost less.
@@ -49,8 +52,8 @@ def error_bounds(error: LinearError, half_widths: Array, rule: Rule, *, exact: b
     Args:
         error: linear in the deviations.
         half_widths: (k,) tolerances.
-        rule: ``worst-case`` for the longest error of all; ``statistical`` for three standard deviations in the
-            direction in which the error varies most.
+        rule: ``worst-case`` for the longest error of all; ``statistical`` for the longest within the ellipsoid of three
+            standard deviations about the mean.
         exact: see ``longest_sum``.
 
     Returns:
@@ -58,46 +61,55 @@ def error_bounds(error: LinearError, half_widths: Array, rule: Rule, *, exact: b
     """
     scaled = error.jacobian * half_widths
     if rule == "statistical":
-        variances, axes = np.linalg.eigh(scaled @ np.swapaxes(scaled, -1, -2))
-        # A tolerance is three standard deviations, and so is the bound.
-        return np.sqrt(np.maximum(variances[:, -1], 0.0)), axes[:, :, -1]
-    found = [longest_sum(each, exact=exact) for each in scaled]
-    sums = np.array([each @ factors for each, (_, factors) in zip(scaled, found, strict=True)])
-    lengths = np.array([length for length, _ in found])
+        # A tolerance is three standard deviations, and so is the ellipsoid.
+        covariances = scaled @ np.swapaxes(scaled, -1, -2)
+        sums = np.array([farthest_point(*each) for each in zip(error.offset, covariances, strict=True)])
+    else:
+        found = [
+            longest_sum(each, mean if mean.any() else None, exact=exact)[1]
+            for mean, each in zip(error.offset, scaled, strict=True)
+        ]
+        sums = error.offset + np.einsum("pdk,pk->pd", scaled, np.array(found))
+    lengths = np.linalg.norm(sums, axis=-1)
     return lengths, sums / np.maximum(lengths, np.finfo(float).tiny)[:, None]
 
 
 def allocate(tolerances: Sequence[Tolerance], error: LinearError, limit: float, rule: Rule) -> Allocation:
     """Return the tolerances of least cost with which the error at every pose is within a limit.
 
-    Along each direction u the bound is a sum of positive terms of the tolerances, so that the problem is a geometric
-    program, convex in the logarithms of the tolerances. Directions are added where the error is longest, until it is
-    within its limit in all.
+    Along each direction u the bound is the mean error and a sum of positive terms of the tolerances, so that the
+    problem is a geometric program, convex in the logarithms of the tolerances. Directions are added where the error is
+    longest, until it is within its limit in all.
 
     Args:
         tolerances: k of them, with their costs.
-        error: linear in deviations within them, with a mean of zero.
+        error: linear in deviations within them.
         limit: of the error at every pose [m].
         rule: see ``error_bounds``.
 
     Raises:
-        InvalidValueError: the mean of the error is not zero, or no deviation moves the tool.
+        InvalidValueError: the mean error is beyond the limit at a pose, or no deviation moves the tool.
 
     Source:
         Boyd et al. (2007), A tutorial on geometric programming; Kelley (1960) for the planes.
     """
     limit = positive(limit, "limit")
-    if error.offset.any():
-        raise InvalidValueError("error: expected a mean of zero, got an offset")
-    given, cost, exponent = (
-        np.array([getattr(each, name) for each in tolerances]) for name in ("half_width", "cost", "exponent")
+    means = np.linalg.norm(error.offset, axis=-1)
+    if means.max() > limit * (1 - _ROOM):
+        raise InvalidValueError(
+            f"limit: expected more than the mean error, {means.max() * 1e3:.4g} mm, which no tolerance makes smaller, "
+            f"got {limit * 1e3:g} mm"
+        )
+    given, cost, exponent, most = (
+        np.array([getattr(each, name) for each in tolerances]) for name in ("half_width", "cost", "exponent", "most")
     )
     moves = np.abs(error.jacobian * given).max(axis=(0, 1))
     moving = moves > _IDLE * moves.max()
     if not moving.any():
         raise InvalidValueError("error: no deviation moves the tool, so that no tolerance has a bound")
-    widths = np.where(moving, given, 0.0)
-    start = given * limit / error_bounds(error, widths, rule)[0].max()
+    start = _scaled(error, np.where(moving, given, 0.0), most, limit, rule)
+    start = np.where(moving, start, np.minimum(given, most))
+    highest = np.log(np.minimum(most / start, _RANGE))
     start_costs = np.where(moving, cost * (given / start) ** exponent, 0.0)
     power = 2 if rule == "statistical" else 1
     planes, logs = np.zeros((0, len(given))), np.zeros(len(given))
@@ -111,16 +123,19 @@ def allocate(tolerances: Sequence[Tolerance], error: LinearError, limit: float, 
         # What the planes allow costs less than any tolerances within the limit. Shortened by the excess, it is within.
         least = float((start_costs * np.exp(-exponent * logs)).sum()) if len(planes) else 0.0
         if exact or rule == "statistical":
-            within = start * np.exp(logs) * min(limit / bounds.max(), 1.0)
+            # The bound is convex, so that it is within its limit as far along as the limit allows in proportion.
+            spare = (limit - means) / np.maximum(bounds - means, np.finfo(float).tiny)
+            within = start * np.exp(logs) * min(spare.min(), 1.0)
             best = min(best, within, key=lambda x: float((start_costs * (start / x) ** exponent).sum()))
             if (start_costs * (start / best) ** exponent).sum() <= least * (1 + _GAP):
                 break
-        over = np.flatnonzero(bounds >= limit * (1 - 1e-12))
-        new = np.abs(np.einsum("pd,pdk->pk", directions[over], error.jacobian[over]) * start / limit) ** power
+        over = np.flatnonzero(bounds >= min(limit, bounds.max()) * (1 - 1e-12))
+        left = limit - (directions[over] * error.offset[over]).sum(axis=-1, keepdims=True)
+        new = np.abs(np.einsum("pd,pdk->pk", directions[over], error.jacobian[over]) * start / left) ** power
         planes = np.concatenate([planes, new])
-        logs = _cheapest(start_costs, exponent, planes, power, logs)
+        logs = _cheapest(start_costs, exponent, planes, power, logs, highest)
     return Allocation(
-        np.where(moving, best, np.inf),
+        np.where(moving, best, most),
         start_costs * (start / best) ** exponent,
         float(start_costs.sum()),
         least,
@@ -128,8 +143,30 @@ def allocate(tolerances: Sequence[Tolerance], error: LinearError, limit: float, 
     )
 
 
-def _cheapest(cost: Array, exponent: Array, planes: Array, power: int, logs: Array) -> Array:
-    """Return the logarithms x that minimise the sum of cost exp(-exponent x) with planes exp(power x) <= 1 each."""
+def _scaled(error: LinearError, given: Array, most: Array, limit: float, rule: Rule) -> Array:
+    """Return the tolerances, all multiplied by one factor, none beyond the most it may be, that just keep a limit."""
+
+    def widths(log: float) -> Array:
+        return np.asarray(np.minimum(given * np.exp(log), most), dtype=np.float64)
+
+    def excess(log: float) -> float:
+        return float(error_bounds(error, widths(log), rule)[0].max()) / limit - 1
+
+    if not error.offset.any() and np.isinf(most).all():
+        return np.asarray(given / (1 + excess(0.0)), dtype=np.float64)
+    low, high = -np.log(_RANGE), np.log(_RANGE)
+    if excess(high) <= 0:
+        return widths(high)
+    return widths(brentq(excess, low, high, xtol=1e-15, rtol=1e-15)) if excess(low) < 0 else widths(low)
+
+
+def _cheapest(  # noqa: PLR0917 - the numbers of one program
+    cost: Array, exponent: Array, planes: Array, power: int, logs: Array, highest: Array
+) -> Array:
+    """Return the logarithms x that minimise the sum of cost exp(-exponent x) with planes exp(power x) <= 1 each.
+
+    None of them is above the highest.
+    """
 
     def objective(x: Array) -> tuple[float, Array]:
         terms = cost * np.exp(-exponent * x)
@@ -149,7 +186,7 @@ def _cheapest(cost: Array, exponent: Array, planes: Array, power: int, logs: Arr
         logs + min(shortest, 0.0),
         jac=True,
         method="SLSQP",
-        bounds=[(-np.log(_RANGE), np.log(_RANGE))] * len(logs),
+        bounds=[(-np.log(_RANGE), top) for top in highest],
         constraints=[{"type": "ineq", "fun": slack, "jac": slack_slopes}],
         options={"ftol": _PRECISION, "maxiter": _STEPS},
     )

@@ -440,8 +440,7 @@ def assess_life(
         return attrs.evolve(life, limit=limit)
     first = np.array([stated.plays[i].first if i in stated.plays else 0.0 for i in range(arm.n)])
     play = play_life(arm, life.q, first, rates, limit, samples=samples, seed=seed)
-    drawn = rates.sample(samples, np.random.default_rng(seed))
-    return attrs.evolve(life, rates=rates, limit=limit, play=play, curve=_curve(life, play, first, drawn))
+    return attrs.evolve(life, rates=rates, limit=limit, play=play, curve=_curve(life, play, first))
 
 
 def _rates(arm: Arm, stated: LifeFile, work: Array) -> WearRates | None:
@@ -452,7 +451,7 @@ def _rates(arm: Arm, stated: LifeFile, work: Array) -> WearRates | None:
     return WearRates(median=[median for median, _ in values], spread=[spread for _, spread in values])
 
 
-def _curve(life: ArmLife, play: PlayLife, first: Array, rates: Array) -> tuple[Array, Array] | None:
+def _curve(life: ArmLife, play: PlayLife, first: Array) -> tuple[Array, Array] | None:
     """Return cycles (c,), and the repeatability at the pose that passes the limit first: 5, 50 and 95 %, (3, c) [m]."""
     end = play.quantile(0.95)
     if not np.isfinite(end) or not end:
@@ -460,7 +459,7 @@ def _curve(life: ArmLife, play: PlayLife, first: Array, rates: Array) -> tuple[A
     cycles = np.linspace(0.0, 1.2 * end, _CURVE)
     squares = (jacobian(life.arm, life.q[play.pose])[:3] ** 2).sum(axis=0) / 12
     factor = play.factors[play.pose]
-    values = [factor * np.sqrt(((first + rates * count) ** 2) @ squares) for count in cycles.tolist()]
+    values = [factor * np.sqrt(((first + play.rates * count) ** 2) @ squares) for count in cycles.tolist()]
     return cycles, np.quantile(np.stack(values), (0.05, 0.5, 0.95), axis=1)
 
 

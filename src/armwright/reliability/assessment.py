@@ -1,24 +1,22 @@
-"""What tolerances of an arm do to its accuracy: bounds, probabilities, shares, and tolerances of least cost."""
+"""What tolerances of a mechanism do to its accuracy: bounds, probabilities, shares, and tolerances of least cost."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, Numbers, evenly_spread, finite_or_none, integer, joint_array, positive
+from armwright.arrays import Array, Numbers, evenly_spread, finite_or_none, integer, positive
 from armwright.errors import InvalidValueError, TooFewError
 from armwright.files.result_table import ResultTable
 from armwright.reliability.allocation import Allocation, Rule, allocate, error_bounds
-from armwright.reliability.arm_errors import sampled_deviations, sampled_errors, tool_error
 from armwright.reliability.linear_error import Estimate, LinearError
-from armwright.reliability.tolerances import Tolerance
+from armwright.reliability.tolerances import Tolerance, sampled_deviations
 
-# The linear law is said to be off where its errors differ by more from those of the full kinematics.
+# The linear law is said to be off where its errors differ by more from those of the full mechanism.
 _LINEAR = 0.01
 # Errors below this are rounding [m].
 _ROUNDING = 1e-12
@@ -26,6 +24,8 @@ _ROUNDING = 1e-12
 _LIMITS = (1e-12, 1e6)
 # Numbers of sampled errors at most.
 _SAMPLED = 20_000_000
+# A tolerance of least cost that differs by a smaller part from the given one is as good as that.
+_CHANGED = 0.05
 _MEANING = (
     "Tolerances are half widths. Worst case: all dimensions are at the ends of their tolerances. Statistical: "
     "deviations are normal and independent, and a tolerance is three standard deviations."
@@ -33,34 +33,56 @@ _MEANING = (
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class ToleranceAssessment:
-    """Accuracy of an arm whose dimensions are within tolerances.
+class Mechanism:
+    """An arm or a linkage at p poses, k of whose dimensions have tolerances.
 
     Attributes:
-        arm: the nominal arm, with n joints.
-        q: (p, n) the configurations [rad] or [m].
+        name: of it.
+        kind: what it is.
+        point: what has the error: ``tool`` or ``tip``.
+        complete: what computes it without the linear law: ``full kinematics``, ``full equilibrium``.
+        poses: (p, ...) what is known of each pose, by the names that JSON has for it.
+        error: of the point, linear in the deviations.
+        lengths: (samples, k) deviations to (samples, p) lengths of the errors, without the linear law [m]; it is told
+            where to say what is being done.
+        notes: what a reader must know of this mechanism.
+    """
+
+    name: str
+    kind: Literal["arm", "linkage"]
+    point: str
+    complete: str
+    poses: Mapping[str, Array]
+    error: LinearError
+    lengths: Callable[[Array, Callable[[str], None]], Array]
+    notes: tuple[str, ...] = ()
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class ToleranceAssessment:
+    """Accuracy of a mechanism whose dimensions are within tolerances.
+
+    Attributes:
+        mechanism: the nominal one, at p poses.
         numbers: (p,) of each among those that were given, from 1.
         given: how many were given.
         tolerances: k of its dimensions.
-        error: of the tool's position, linear in the deviations.
         limit: of the error [m]; None where none is asked for.
         worst_case: (p,) the longest error at each pose [m].
-        statistical: (p,) three standard deviations along the direction in which the error varies most [m].
-        sampled: (samples, p) lengths of the errors of random arms by their full kinematics [m].
-        nonlinearity: root mean square of what these differ by from the errors of the linear law, by that of the latter,
-            at the pose where this is largest.
+        statistical: (p,) the longest error within the ellipsoid of three standard deviations [m].
+        sampled: (samples, p) lengths of the errors of random mechanisms, without the linear law [m].
+        nonlinearity: root mean square of what these differ by from the errors of the linear law, by that of what
+            deviations do after the latter, at the pose where this is largest.
         on_path: probability that the error is beyond the limit at any pose; None without a limit.
         at_poses: (p,) the same at each pose, by the exact law; None without a limit.
         allocation: tolerances of least cost that keep the limit; None where none is asked for.
         rule: by which they keep it.
     """
 
-    arm: Arm
-    q: Array
+    mechanism: Mechanism
     numbers: Numbers
     given: int
     tolerances: tuple[Tolerance, ...]
-    error: LinearError
     limit: float | None
     worst_case: Array
     statistical: Array
@@ -71,10 +93,20 @@ class ToleranceAssessment:
     allocation: Allocation | None = None
     rule: Rule = "worst-case"
 
+    @property
+    def error(self) -> LinearError:
+        """The error, linear in the deviations."""
+        return self.mechanism.error
+
+    @property
+    def mean(self) -> Array:
+        """(p,) length of the mean error at each pose [m]."""
+        return np.asarray(np.linalg.norm(self.error.offset, axis=-1), dtype=np.float64)
+
     @cached_property
     def worst_pose(self) -> int:
         """The pose, from 0, at which the error varies most."""
-        return int(self.statistical.argmax())
+        return int(np.linalg.eigvalsh(self.error.covariance)[:, -1].argmax())
 
     @cached_property
     def ranking(self) -> list[int]:
@@ -85,34 +117,35 @@ class ToleranceAssessment:
     def notes(self) -> tuple[str, ...]:
         """What a reader must know beside the numbers."""
         notes = [_MEANING]
-        if len(self.q) < self.given:
+        if (count := len(self.numbers)) < self.given:
             notes.append(
-                f"{len(self.q)} of the {self.given} poses are computed, evenly spread; the error may be longer between."
+                f"{count} of the {self.given} poses are computed, evenly spread; the error may be longer between."
             )
         if self.nonlinearity > _LINEAR:
             notes.append(
-                f"The errors of the full kinematics differ by {self.nonlinearity:.1%} from the linear law: trust the "
-                "sampled ones."
+                f"The errors of the {self.mechanism.complete} differ by {self.nonlinearity:.1%} from the linear law: "
+                "trust the sampled ones."
             )
         if self.on_path is not None and self.on_path.standard_error > 0.1 * self.on_path.probability:
-            notes.append("The probability on the path is rough: more --samples make it finer.")
-        return tuple(notes)
+            notes.append("The probability on the path is rough: its standard error is more than a tenth of it.")
+        return (*notes, *self.mechanism.notes)
 
     def as_data(self) -> dict[str, Any]:
         """Return the assessment as plain data in SI units."""
         allocation = self.allocation
         return {
-            "arm": self.arm.name,
+            self.mechanism.kind: self.mechanism.name,
             "limit_m": self.limit,
             "poses": [
                 {
                     "number": int(self.numbers[p]),
-                    "q": self.q[p].tolist(),
+                    **{name: values[p].tolist() for name, values in self.mechanism.poses.items()},
+                    "mean_m": float(self.mean[p]),
                     "worst_case_m": float(self.worst_case[p]),
                     "statistical_m": float(self.statistical[p]),
                     "probability": None if self.at_poses is None else float(self.at_poses[p]),
                 }
-                for p in range(len(self.q))
+                for p in range(len(self.numbers))
             ],
             "on_path": None if self.on_path is None else self.on_path._asdict(),
             "sampled_beyond_limit": None if self.limit is None else int((self.sampled > self.limit).any(axis=1).sum()),
@@ -121,7 +154,7 @@ class ToleranceAssessment:
             "dimensions": [
                 {
                     "name": self.tolerances[i].name,
-                    "unit": "m" if self.tolerances[i].is_length else "rad",
+                    "unit": self.tolerances[i].unit,
                     "half_width": self.tolerances[i].half_width,
                     "share": float(self.error.shares[self.worst_pose, i]),
                     "allocated": finite_or_none(allocation.half_widths[i]) if allocation else None,
@@ -140,9 +173,10 @@ class ToleranceAssessment:
         }
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the tables: the arm, its dimensions, and its tolerances of least cost."""
+        """Give the tables: the mechanism, its dimensions, and its tolerances of least cost."""
+        count = len(self.numbers)
         yield ResultTable(
-            title=f"{self.arm.name}: error of the tool at {len(self.q)} pose{'s' if len(self.q) > 1 else ''}",
+            title=f"{self.mechanism.name}: error of the {self.mechanism.point} at {count} pose{'s' * (count > 1)}",
             heads=("quantity", "worst pose", "value"),
             rows=tuple(self._summary()),
             numbers=(1, 2),
@@ -150,10 +184,13 @@ class ToleranceAssessment:
         yield self._dimension_table()
 
     def _summary(self) -> Iterator[tuple[str, str, str]]:
+        if self.error.offset.any():
+            yield "mean dimensions, mm", self._number(self.mean), _mm(self.mean.max())
         yield "worst case, mm", self._number(self.worst_case), _mm(self.worst_case.max())
         yield "statistical, mm", self._number(self.statistical), _mm(self.statistical.max())
-        mean = self.sampled.mean(axis=0)
-        yield "mean error of sampled arms, mm", self._number(mean), _mm(mean.max())
+        mean, kind = self.sampled.mean(axis=0), self.mechanism.kind
+        yield f"mean error of sampled {kind}s, mm", self._number(mean), _mm(mean.max())
+        yield f"{self.mechanism.complete} against linear law", "", f"{100 * self.nonlinearity:.2g} %"
         if self.limit is None or self.at_poses is None or self.on_path is None:
             return
         beyond, count = int((self.sampled > self.limit).any(axis=1).sum()), len(self.sampled)
@@ -161,7 +198,7 @@ class ToleranceAssessment:
         limit = f"{self.limit * 1e3:g} mm"
         yield f"P(error > {limit}) at a pose, exact", self._number(self.at_poses), f"{self.at_poses.max():.3g}"
         yield f"P(error > {limit}) at any pose", "", f"{path.probability:.3g} ± {path.standard_error:.1g}"
-        yield f"sampled arms beyond {limit}", "", f"{beyond} of {count}"
+        yield f"sampled {kind}s beyond {limit}", "", f"{beyond} of {count}"
 
     def _number(self, values: Array) -> str:
         """Return the number of the pose with the largest value."""
@@ -192,7 +229,8 @@ class ToleranceAssessment:
             saved = allocation.scaled_cost / allocation.costs.sum() - 1
             remark = (
                 f"Least cost for {self.limit * 1e3:g} mm by the {self.rule} rule: {allocation.costs.sum():.4g}; the "
-                f"given tolerances, all scaled to the same limit, cost {allocation.scaled_cost:.4g}: {saved:.1%} more."
+                f"given tolerances, all scaled to the same limit, cost {allocation.scaled_cost:.4g}: {saved:.1%} more. "
+                f"{self._advice(allocation)}"
             )
         return ResultTable(
             title=f"Dimensions, by their share of the variance at pose {self.numbers[self.worst_pose]}",
@@ -202,58 +240,66 @@ class ToleranceAssessment:
             remark=remark,
         )
 
+    def _advice(self, allocation: Allocation) -> str:
+        """Say which tolerance to relax and which to tighten first."""
+        factors = allocation.half_widths / [each.half_width for each in self.tolerances]
+        bound = np.where(np.isfinite(factors), factors, 1.0)
+        relaxed, tightened = int(bound.argmax()), int(bound.argmin())
+        parts = []
+        if bound[relaxed] > 1 + _CHANGED:
+            parts.append(f"relax {self.tolerances[relaxed].name} first (x {bound[relaxed]:.3g})")
+        if bound[tightened] < 1 - _CHANGED:
+            parts.append(f"tighten {self.tolerances[tightened].name} first (x {bound[tightened]:.3g})")
+        text = ", and ".join(parts) or "the given tolerances are about those of least cost"
+        return f"{text[0].upper()}{text[1:]}."
 
-def assess_tolerances(
-    arm: Arm,
-    q: ArrayLike,
+
+def assess(
+    mechanism_at: Callable[[Numbers], Mechanism],
+    given: int,
     tolerances: Sequence[Tolerance],
     *,
-    limit: float | None = None,
-    allocation: Rule | None = None,
-    samples: int = 1000,
-    seed: int = 0,
-    uniform: bool = False,
-    most: int = 200,
-    progress: Callable[[str], None] | None = None,
+    limit: float | None,
+    allocation: Rule | None,
+    samples: int,
+    seed: int,
+    uniform: bool,
+    most: int,
+    progress: Callable[[str], None] | None,
 ) -> ToleranceAssessment:
-    """Assess what tolerances of an arm's dimensions do to the position of its tool.
+    """Assess what tolerances do to the accuracy of a mechanism; see ``assess_tolerances``.
 
     Args:
-        arm: with n joints.
-        q: (p, n) configurations, or one of them [rad] or [m].
-        tolerances: of dimensions of the arm.
-        limit: of the error [m]; without it there are no probabilities.
+        mechanism_at: returns the mechanism at those of the given poses that have some numbers, from 0.
+        given: number of poses.
+        tolerances: of its dimensions.
+        limit: of the error [m]; None for no probabilities.
         allocation: rule by which tolerances of least cost keep the limit; None for no such tolerances.
-        samples: how many random arms are drawn, with their full kinematics.
+        samples: how many random mechanisms are drawn.
         seed: of all samples.
-        uniform: whether the deviations of these are uniform within tolerances, and not normal.
-        most: of more configurations, so many are computed, evenly spread, the first and the last included.
+        uniform: whether the deviations of these are uniform within tolerances.
+        most: of more poses, so many are computed.
         progress: is told what is being done.
 
     Raises:
-        ShapeError: ``q`` does not fit the arm.
-        InvalidValueError: a number is out of its range, or tolerances of least cost are asked for without a limit.
-        TooFewError: there is no configuration, or no tolerance.
+        InvalidValueError: a number is out of its range.
+        TooFewError: there is no pose, or no tolerance.
     """
-    every = np.atleast_2d(joint_array(q, arm.n))
-    if not len(every) or not tolerances:
-        raise TooFewError("expected a configuration and a tolerance at least")
-    rows = evenly_spread(len(every), most)
-    configurations = every[rows]
+    if not given or not tolerances:
+        raise TooFewError("expected a pose and a tolerance at least")
+    rows = evenly_spread(given, most)
     if integer(samples, "samples", least=1) * len(rows) > _SAMPLED:
         raise InvalidValueError(
-            f"samples: expected at most {_SAMPLED // len(rows)} random arms for so many poses, got {samples}"
+            f"samples: expected at most {_SAMPLED // len(rows)} random mechanisms for so many poses, got {samples}"
         )
     if limit is not None and not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
         raise InvalidValueError(f"limit: expected {_LIMITS[0]:g} to {_LIMITS[1]:g} m, got {limit:g}")
     say = progress or (lambda _: None)
-    error = tool_error(arm, configurations, tolerances)
+    mechanism = mechanism_at(rows)
+    error = mechanism.error
     widths = np.array([each.half_width for each in tolerances])
     worst, _ = error_bounds(error, widths, "worst-case")
     statistical, _ = error_bounds(error, widths, "statistical")
-    say("random arms")
-    sampled = sampled_errors(arm, configurations, tolerances, samples=samples, seed=seed, uniform=uniform)
-    deviations = sampled_deviations(tolerances, samples=samples, seed=seed, uniform=uniform)
     on_path = at_poses = found = None
     if limit is not None:
         say("probabilities")
@@ -261,13 +307,14 @@ def assess_tolerances(
         if allocation is not None:
             say("tolerances of least cost")
             found = allocate(tolerances, error, limit, allocation)
+    say(f"random {mechanism.kind}s")
+    deviations = sampled_deviations(tolerances, samples=samples, seed=seed, uniform=uniform)
+    sampled = mechanism.lengths(deviations, say)
     return ToleranceAssessment(
-        arm=arm,
-        q=configurations,
+        mechanism=mechanism,
         numbers=rows + 1,
-        given=len(every),
+        given=given,
         tolerances=tuple(tolerances),
-        error=error,
         limit=limit,
         worst_case=worst,
         statistical=statistical,
@@ -283,11 +330,16 @@ def assess_tolerances(
 def _nonlinearity(error: LinearError, deviations: Array, sampled: Array) -> float:
     # Pose by pose, so that no array is larger than the sampled errors.
     largest = 0.0
-    for J, full in zip(error.jacobian, sampled.T, strict=True):
-        linear = np.linalg.norm(deviations @ J.T, axis=1)
-        off, length = (float(np.sqrt((x**2).mean())) for x in (full - linear, linear))
-        largest = max(largest, off / max(length, _ROUNDING))
+    for mean, J, full in zip(error.offset, error.jacobian, sampled.T, strict=True):
+        shifts = deviations @ J.T
+        off, size = (_root_mean_square(x) for x in (full - np.linalg.norm(mean + shifts, axis=1), shifts))
+        largest = max(largest, off / max(size, _ROUNDING))
     return largest
+
+
+def _root_mean_square(x: Array) -> float:
+    """Return that of numbers (samples,), or of the lengths of vectors (samples, d)."""
+    return float(np.sqrt((x**2).sum() / len(x)))
 
 
 def _mm(metres: float) -> str:

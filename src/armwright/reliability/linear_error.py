@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import attrs
@@ -24,6 +25,8 @@ _FLAT = 1e-9
 _NEAR = 0.7
 # Numbers of a block of samples.
 _BLOCK = 4_000_000
+# Halvings of the interval in which a ray fails, and how far out it is looked for, in its own length.
+_HALVINGS, _FARTHEST = 20, 16.0
 
 
 class Estimate(NamedTuple):
@@ -53,12 +56,15 @@ class LinearError:
         deviations: (k,) their standard deviations, each in its own unit.
         offset: (p, d) the mean error at each pose, d from 1 to 3.
         jacobian: (p, d, k) derivatives of the errors.
+        exact: returns the errors (m, p, d) for (m, k) standard normal numbers, where they are not linear in these;
+            offset and jacobian then only lead samples to failures. None where the linear law holds.
     """
 
     names: tuple[str, ...]
     deviations: Array = attrs.field(converter=_array)
     offset: Array = attrs.field(converter=_array)
     jacobian: Array = attrs.field(converter=_array)
+    exact: Callable[[Array], Array] | None = None
 
     def __attrs_post_init__(self) -> None:
         """Refuse arrays that do not fit each other."""
@@ -94,8 +100,28 @@ class LinearError:
         return np.asarray(variances / np.maximum(variances.sum(axis=-1, keepdims=True), np.finfo(float).tiny))
 
     def pose_probabilities(self, limit: float) -> Array:
-        """Return (p,) the probability that the error at each pose is longer than a limit, by the exact law."""
-        return np.array([exceedance(m, C, limit) for m, C in zip(self.offset, self.covariance, strict=True)])
+        """Return (p,) the probability that the error at each pose is longer than a limit.
+
+        By the exact law of a linear error, and otherwise sampled; see ``path_probability``.
+        """
+        if self.exact is None:
+            return np.array([exceedance(m, C, limit) for m, C in zip(self.offset, self.covariance, strict=True)])
+        return np.array([self._at(i).path_probability(limit).probability for i in range(len(self.offset))])
+
+    def errors(self, z: Array) -> Array:
+        """Return (m, p, d) the errors for standard normal numbers (m, k)."""
+        if self.exact is not None:
+            return self.exact(z)
+        return np.asarray(np.tensordot(z, self.standardized, axes=([1], [2])) + self.offset)
+
+    def _at(self, pose: int) -> LinearError:
+        """Return the error at one pose."""
+
+        def errors(z: Array) -> Array:
+            return self.errors(z)[:, [pose]]
+
+        own = None if self.exact is None else errors
+        return attrs.evolve(self, offset=self.offset[[pose]], jacobian=self.jacobian[[pose]], exact=own)
 
     def path_probability(self, limit: float, *, samples: int = 100_000, seed: int = 0) -> Estimate:
         """Return the probability that the error is longer than a limit at any of the poses, by importance sampling.
@@ -119,9 +145,11 @@ class LinearError:
         for first in range(0, count, block):
             rows = min(block, count - first)
             z = rng.normal(size=(rows, L.shape[-1])) + centres[rng.choice(len(parts), rows, p=parts)]
-            errors = np.tensordot(z, L, axes=([1], [2])) + self.offset
-            failed = (np.square(errors).sum(axis=-1) > limit**2).any(axis=-1)
-            weights = 1 / (np.exp(z[failed] @ centres.T - halves) @ parts)
+            failed = (np.square(self.errors(z)).sum(axis=-1) > limit**2).any(axis=-1)
+            # The first centre is the nominal one, so that the largest exponent is 0 or more, and nothing overflows.
+            exponents = z[failed] @ centres.T - halves
+            top = exponents.max(axis=1, initial=0.0)
+            weights = np.exp(-top) / (np.exp(exponents - top[:, None]) @ parts)
             total, squares = total + float(weights.sum()), squares + float((weights**2).sum())
         mean = total / count
         return Estimate(mean, float(np.sqrt(max(squares / count - mean**2, 0.0) / count)), count)
@@ -130,7 +158,7 @@ class LinearError:
         """Return centres (c, k) of normal densities about failures, and their parts (c,); the first one is nominal."""
         directions = _directions(self.offset.shape[1])
         centres, logs = [], []
-        for mean, each in zip(self.offset, L, strict=True):
+        for pose, (mean, each) in enumerate(zip(self.offset, L, strict=True)):
             if np.linalg.norm(mean) >= limit:
                 continue  # it fails as it is: the nominal density finds the failures
             # Along the axes of the deviations all directions are equally probable, and of those to the nearest failure
@@ -146,7 +174,10 @@ class LinearError:
             steps = ways * sizes[varies] @ axes[:, varies].T
             a, b = (steps**2).sum(axis=1), steps @ mean
             distance = (np.sqrt(b**2 + a * (limit**2 - mean @ mean)) - b) / a
-            centres.append(distance[:, None] * ways @ across[varies])
+            points = distance[:, None] * ways @ across[varies]
+            if self.exact is not None:
+                points, distance = self._moved(points, pose, limit)
+            centres.append(points)
             logs.append(-0.5 * distance**2)
         if not centres:
             return np.zeros((1, L.shape[-1])), np.ones(1)
@@ -157,6 +188,16 @@ class LinearError:
         kept, parts = _merged(z[heaviest], weights[: len(heaviest)])
         parts *= (1 - _NOMINAL) / parts.sum()
         return np.concatenate([np.zeros((1, L.shape[-1])), kept]), np.concatenate([[_NOMINAL], parts])
+
+    def _moved(self, points: Array, pose: int, limit: float) -> tuple[Array, Array]:
+        """Return the failures at a pose on the rays to points (c, k), and their distances (c,)."""
+        low, high = np.zeros(len(points)), np.full(len(points), _FARTHEST)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            inside = np.linalg.norm(self.errors(middle[:, None] * points)[:, pose], axis=1) < limit
+            low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+        # A ray without failure ends far out, where it has no weight.
+        return high[:, None] * points, high * np.linalg.norm(points, axis=1)
 
 
 def _merged(centres: Array, weights: Array) -> tuple[Array, Array]:

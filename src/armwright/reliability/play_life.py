@@ -53,6 +53,7 @@ class PlayLife(NamedTuple):
         factors: (p,) repeatability of each pose by the root of the trace of its covariance.
         shares: (n,) part of each joint in the variance at the pose that passes the limit first, at the median life.
         pose: that pose, from 0.
+        rates: (samples, n) growth of each joint's play per cycle [rad] or [m].
     """
 
     cycles: Array
@@ -60,6 +61,7 @@ class PlayLife(NamedTuple):
     factors: Array
     shares: Array
     pose: int
+    rates: Array
 
     def quantile(self, part: float) -> float:
         """Return the cycles that this part of the arms does not reach."""
@@ -135,7 +137,8 @@ def play_life(
     pose = int(np.bincount(lives.argmin(axis=1), minlength=len(J)).argmax())
     variances = squares[pose] * worn**2
     new = repeatability_factors(arm, configurations, first, seed=seed) * np.sqrt(_trace(J, first**2))
-    return PlayLife(cycles, new, factors, variances / max(float(variances.sum()), np.finfo(float).tiny), pose)
+    shares = variances / max(float(variances.sum()), np.finfo(float).tiny)
+    return PlayLife(cycles, new, factors, shares, pose, drawn)
 
 
 def _trace(J: Array, squares: Array) -> Array:

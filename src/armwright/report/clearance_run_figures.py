@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, evenly_spread
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_position
+from armwright.clearance.lane_layout import Integers
+from armwright.clearance.worn_walls import pin_directions
 from armwright.report.figures import (
     Drawing,
     empty_figure,
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
 _ERROR_SHARE, _MAX_POINTS = 0.2, 2500
 # The way of a journal is coloured by time in so many pieces.
 _SEGMENTS = 100
+# Outlines of a worn wall over a run, as many as the eye can follow, and points of each.
+_OUTLINES, _OUTLINE_POINTS = 25, 120
 # So many places of the path without play are tied to those of the same moment with it.
 _LINKS = 31
 # A label of y is read from below, so that its arrow points up.
@@ -42,9 +46,10 @@ def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
     """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
     drawn = []
     path = f"The path without play and the path taken, its error magnified {magnification(run):g} times"
+    worn = "" if run.simulation.worn is None else ", red: worn walls at the start, and dotted at the end"
     for name, draw, caption in (
         ("path", _draw_path, path),
-        ("bearings", _draw_bearings, "Centres of the journals in their bearings; circles: clearances"),
+        ("bearings", _draw_bearings, f"Centres of the journals in their bearings; circles: clearances{worn}"),
         ("error", _draw_error, "Error of the tip over time"),
         ("spectrum", _draw_spectrum, "Amplitudes of the error: mean removed, up to 200 Hz"),
         ("forces", _draw_forces, "Forces between journals and bearings; a gap in a curve: the journal flies"),
@@ -90,6 +95,24 @@ def _draw_path(figure: "Figure", run: ClearanceRun) -> None:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
 
 
+def wall_outlines(run: ClearanceRun, pin: int, rows: Integers) -> Array:
+    """Return (k, d, 2) how far the middle of a journal can go in a worn bearing, in the axes of the ground [m].
+
+    Args:
+        run: of a linkage with worn pins.
+        pin: number of the pin.
+        rows: numbers of rows of the run, of which k at most are taken, evenly spread.
+    """
+    simulation = run.simulation
+    assert simulation.worn is not None  # noqa: S101 - round walls have no outline
+    q = simulation.q[rows[evenly_spread(len(rows), _OUTLINES)]]
+    angles = pin_directions(simulation.scenario.linkage, q)
+    around = np.arange(_OUTLINE_POINTS) * (2 * np.pi / _OUTLINE_POINTS)
+    turned, rotation = around - angles.bearing[:, pin, None], angles.rotation[:, pin, None]
+    reach = simulation.clearances[pin] + simulation.worn.at(pin, turned, rotation).growth
+    return np.asarray(reach[..., None] * np.stack([np.cos(around), np.sin(around)], axis=-1))
+
+
 def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.patches import Circle  # noqa: PLC0415
@@ -104,14 +127,21 @@ def _draw_bearings(figure: "Figure", run: ClearanceRun) -> None:
     lines: Any = None
     for i, (axis, pin) in enumerate(zip(panels, pins, strict=True)):
         gaps = run.gaps[samples, i] * 1e3
-        wall = float(run.simulation.clearances[i]) * 1e3
+        clearance = wall = float(run.simulation.clearances[i]) * 1e3
         axis.add_patch(Circle((0, 0), wall, fill=False, color="k", linewidth=1.2))
+        if run.simulation.worn is not None:
+            for outline, style in zip(wall_outlines(run, i, np.array([0, run.rows - 1])) * 1e3, "-:", strict=True):
+                axis.plot(*np.vstack([outline, outline[:1]]).T, style, color="C3", linewidth=1.0)
+                wall = max(wall, float(np.linalg.norm(outline, axis=-1).max()))
         lines = LineCollection([gaps[segment] for segment in segments], array=factor, cmap="viridis", linewidths=1.0)
         axis.add_collection(lines)
         axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
         shown = (-1.12 * wall, 1.12 * wall)
         axis.set(
-            title=plain_label(f"{pin.name}, {wall:g} mm"), xlabel="x, mm \N{RIGHTWARDS ARROW}", xlim=shown, ylim=shown
+            title=plain_label(f"{pin.name}, {clearance:g} mm"),
+            xlabel="x, mm \N{RIGHTWARDS ARROW}",
+            xlim=shown,
+            ylim=shown,
         )
         axis.set_aspect("equal")
         axis.grid(visible=True, alpha=0.3)

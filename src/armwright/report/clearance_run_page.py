@@ -12,8 +12,9 @@ import numpy as np
 
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_position
+from armwright.clearance.lane_layout import Integers
 from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
-from armwright.report.clearance_run_figures import magnification_factor
+from armwright.report.clearance_run_figures import magnification_factor, wall_outlines
 from armwright.report.elements import (
     Tile,
     badge,
@@ -58,7 +59,8 @@ def animation_data(run: ClearanceRun) -> dict[str, Any]:
         tip: index of the point that is the tip.
         path_m: (r, 2) positions of the tip without clearance.
         error_um: (r, 2) error of the tip.
-        pins: name, clearance, indices of the centres of bearing and journal, and largest force of each pin.
+        pins: name, clearance, farthest place of the journal, indices of the centres of bearing and journal, largest
+            force of each pin, and outlines of its wall at equally spaced rows, where it is worn.
         gaps_um: (r, 2 p) vectors from the centre of each bearing to that of its journal.
         forces_N: (r, p) contact forces; the largest since the previous row.
         flies: (r, p) 1 where a journal does not touch its bearing.
@@ -89,7 +91,7 @@ def animation_data(run: ClearanceRun) -> dict[str, Any]:
         "tip": points.index(linkage.tip) if linkage.tip in points else -1,
         "path_m": simulation.tip[rows] - simulation.error[rows],
         "error_um": simulation.error[rows] * _MICRO,
-        "pins": _pin_data(run, points),
+        "pins": _pin_data(run, points, rows),
         "gaps_um": run.gaps[rows].reshape(len(rows), -1) * _MICRO,
         # A blow between two rows is not lost.
         "forces_N": np.maximum.reduceat(simulation.forces[: run.rows], rows, axis=0),
@@ -141,7 +143,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def _pin_data(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, Any]]:
+def _pin_data(run: ClearanceRun, points: Sequence[BodyPoint], rows: Integers) -> list[dict[str, Any]]:
     """Return the pins; a bearing or journal on the ground has a position instead of an index."""
     linkage = run.simulation.scenario.linkage
     pins = []
@@ -151,8 +153,11 @@ def _pin_data(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, 
             for point in (pin.bearing, pin.journal)
         )
         clearance, peak = float(run.simulation.clearances[i]) * _MICRO, float(run.simulation.peaks[i])
+        outlines = np.zeros((0, 0, 2)) if run.simulation.worn is None else wall_outlines(run, i, rows) * _MICRO
+        reach = float(np.linalg.norm(outlines, axis=-1).max(initial=clearance))
         ends = {"bearing": bearing, "journal": journal}
-        pins.append({"name": pin.name, "clearance_um": clearance, "peak_N": peak, **ends})
+        drawn = {"reach_um": reach, "outlines_um": [np.round(outline, 2).ravel().tolist() for outline in outlines]}
+        pins.append({"name": pin.name, "clearance_um": clearance, "peak_N": peak, **drawn, **ends})
     return pins
 
 

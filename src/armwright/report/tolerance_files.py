@@ -33,7 +33,7 @@ def tolerance_files(assessment: ToleranceAssessment, *, command: str) -> dict[st
     return {
         "tolerance.json": json.dumps(assessment.as_data(), indent=2, ensure_ascii=False) + "\n",
         "report.html": static_page(
-            title=f"Tolerances of {assessment.arm.name}",
+            title=f"Tolerances of {assessment.mechanism.name}",
             command=command,
             sections=[
                 Card("Accuracy", tables(assessment.tables())),
@@ -54,6 +54,8 @@ def tolerance_files(assessment: ToleranceAssessment, *, command: str) -> dict[st
 def _tiles(assessment: ToleranceAssessment) -> Iterator[Tile]:
     limit, worst = assessment.limit, float(assessment.worst_case.max())
     over = limit is not None and worst > limit
+    if assessment.mean.any():
+        yield Tile(f"{assessment.mean.max() * 1e3:.3f} mm", "mean dimensions")
     yield Tile(f"{worst * 1e3:.3f} mm", "worst case", mark="bad" if over else "")
     yield Tile(f"{assessment.statistical.max() * 1e3:.3f} mm", "statistical, three standard deviations")
     if limit is not None and assessment.on_path is not None:
@@ -64,10 +66,11 @@ def _tiles(assessment: ToleranceAssessment) -> Iterator[Tile]:
 
 
 def _drawings(assessment: ToleranceAssessment) -> Iterator[Drawing]:
-    if len(assessment.q) > 1:
+    if len(assessment.numbers) > 1:
         yield Drawing(
             "errors",
-            "errors along the poses: worst case, three standard deviations, and the middle nine tenths of random arms",
+            "errors along the poses: worst case, three standard deviations, and the middle nine tenths of random "
+            f"{assessment.mechanism.kind}s",
             _errors(assessment),
         )
     yield Drawing(
@@ -83,16 +86,21 @@ def _drawings(assessment: ToleranceAssessment) -> Iterator[Drawing]:
 
 def _errors(assessment: ToleranceAssessment) -> str:
     figure = empty_figure((7.4, 4.0))
-    axes = plain_axes(figure, "pose", "error of the tool, mm")
+    axes = plain_axes(figure, "pose", f"error of the {assessment.mechanism.point}, mm")
     poses = assessment.numbers
     low, high = np.quantile(assessment.sampled, (0.05, 0.95), axis=0) * 1e3
-    axes.fill_between(poses, low, high, color="C0", alpha=0.2, label="nine tenths of random arms")
+    many = f"nine tenths of random {assessment.mechanism.kind}s"
+    axes.fill_between(poses, low, high, color="C0", alpha=0.2, label=many)
     axes.plot(poses, assessment.worst_case * 1e3, "-", color="C3", label="worst case")
     axes.plot(poses, assessment.statistical * 1e3, "--", color="C0", label="statistical")
+    if assessment.mean.any():
+        axes.plot(poses, assessment.mean * 1e3, "-.", color="C2", label="mean dimensions")
     if assessment.limit is not None:
         axes.axhline(assessment.limit * 1e3, color="C7", linestyle=":", label="limit")
-    axes.set_ylim(bottom=0)
-    axes.legend(fontsize="small")
+    # Room for the legend above the lines.
+    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
+    axes.locator_params(axis="x", integer=True)
+    axes.legend(fontsize="small", loc="upper right", ncols=2)
     return svg_text(figure, "Error along the poses")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.wear.assessment import QUANTILES, WearAssessment
 from armwright.clearance.wear.foundation import bin_angles
+from armwright.clearance.wear.life_file import surfaces_data
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, empty_figure, plain_axes, plain_label, round_number, svg_text
 from armwright.report.motion_table import csv_lines
@@ -29,12 +30,12 @@ def wear_files(assessment: WearAssessment, *, command: str) -> dict[str, Any]:
     """
     drawn = [_profiles(assessment), _curves(assessment)]
     beside = {
-        "wear.json": "all numbers, in SI units",
+        "wear.json": "all numbers, in SI units, and the worn profiles over the strokes",
         "life.csv": "errors and depths over the strokes",
         "profiles.csv": "the worn profiles at the end",
     }
     return {
-        "wear.json": json.dumps({"command": command, **assessment.as_data()}, indent=2, ensure_ascii=False) + "\n",
+        "wear.json": _numbers(assessment, command),
         "life.csv": csv_lines(_life_columns(assessment), 9),
         "profiles.csv": csv_lines(_profile_columns(assessment), 9),
         "report.html": static_page(
@@ -50,6 +51,12 @@ def wear_files(assessment: WearAssessment, *, command: str) -> dict[str, Any]:
         ),
         **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
     }
+
+
+def _numbers(assessment: WearAssessment, command: str) -> str:
+    """Return the text of wear.json; the many depths of its surfaces stand on one line."""
+    text = json.dumps({"command": command, **assessment.as_data()}, indent=2, ensure_ascii=False).removesuffix("\n}")
+    return f'{text},\n  "surfaces": {json.dumps(surfaces_data(assessment.life))}\n}}\n'
 
 
 def _tiles(assessment: WearAssessment) -> Iterator[Tile]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeAlias
+from typing import Concatenate, ParamSpec, Protocol, TypeAlias
 
 import numpy as np
 
@@ -15,10 +15,11 @@ from armwright.dynamics.drives import drive_speeds, efforts_at_joints, friction_
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares
 from armwright.dynamics.springs import with_springs
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 # Where the arm should be: (n,) positions at a time, or their derivative of an order 1 or 2. A trajectory is one.
 Reference: TypeAlias = Callable[[float, int], Array]
+_Rest = ParamSpec("_Rest")
 
 
 class Controller(Protocol):
@@ -34,6 +35,30 @@ class Controller(Protocol):
             q: (n,) joint positions.
             qd: (n,) joint speeds.
         """
+
+
+def returning(
+    function: Callable[Concatenate[float, _Rest], ArrayLike], n: int, what: str
+) -> Callable[Concatenate[float, _Rest], Array]:
+    """Return a function of time that is refused at the first moment at which it does not return n numbers.
+
+    Args:
+        function: of a time and whatever else.
+        n: how many numbers it must return; they may be infinite or not a number.
+        what: they are, for a message.
+    """
+
+    def checked(t: float, /, *rest: _Rest.args, **named: _Rest.kwargs) -> Array:
+        returned = function(t, *rest, **named)
+        try:
+            array = np.asarray(returned, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise KindError(f"{what} at {t:g} s: expected numbers, got {shown(returned)}") from error
+        if array.shape != (n,):
+            raise ShapeError(f"{what} at {t:g} s: expected shape ({n},), got {array.shape}")
+        return array
+
+    return checked
 
 
 def standing(q: ArrayLike) -> Reference:

@@ -22,7 +22,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
-from armwright.arrays import LARGEST_ANGLE, Array, ArrayLike, exact_shape, one_per_joint, positive, read_only
+from armwright.arrays import LARGEST_ANGLE, Array, ArrayLike, one_per_joint, positive, read_only
 from armwright.compiled.arm import can_be_compiled, compile_arm
 from armwright.dynamics.accelerations import without_drives
 from armwright.dynamics.drives import friction_law
@@ -33,7 +33,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.forward_kinematics import forward
-from armwright.simulation.controllers import Controller, Reference
+from armwright.simulation.controllers import Controller, Reference, returning
 from armwright.simulation.integrators import Adaptive, Integrator
 from armwright.simulation.result import Status
 from armwright.simulation.sample_times import check_samples, sample_times
@@ -187,13 +187,10 @@ def simulate_flexible(
     if motors is not None:
         if controller is not None or theta is not None:
             raise InvalidValueError("motors: their positions are given; expected neither efforts nor a start of theirs")
-        exact_shape(motors(0.0, 0), (arm.n,), "positions of the motors")
         plant: _Plant = _Guided(arm, motors)
         y = np.concatenate([start, speed, np.zeros(2)])
     else:
         _check_driven(arm)
-        if controller is not None:
-            exact_shape(controller(0.0, start, speed), (arm.n,), "efforts of the controller")
         first = start if theta is None else one_per_joint(theta, arm.n, "theta")
         plant = _Driven(arm, controller or (lambda _t, _q, _qd: np.zeros(arm.n)))
         y = np.concatenate([start, speed, first, speed, np.zeros(2)])
@@ -301,11 +298,11 @@ class _Guided(_Plant):
 
     def __init__(self, arm: Arm, motors: Reference) -> None:
         super().__init__(arm)
-        self._motors = motors
+        self._motors = returning(motors, arm.n, "motion of the motors")
 
     def moment(self, t: float, y: Array) -> _Moment:
         n, rigid, f = self.arm.n, self.rigid, self.flexible
-        theta, thetad, thetadd = (np.asarray(self._motors(t, order), dtype=np.float64) for order in range(3))
+        theta, thetad, thetadd = (self._motors(t, order) for order in range(3))
         q, qd = np.where(rigid, theta, y[:n]), np.where(rigid, thetad, y[n : 2 * n])
         gears = self.transmitted(q, qd, theta, thetad)
         M, bias = self.mass_and_bias(q, qd)
@@ -321,14 +318,14 @@ class _Driven(_Plant):
 
     def __init__(self, arm: Arm, controller: Controller) -> None:
         super().__init__(arm)
-        self._controller = controller
+        self._controller = returning(controller, arm.n, "efforts of the controller")
 
     def moment(self, t: float, y: Array) -> _Moment:
         n, rigid, f = self.arm.n, self.rigid, self.flexible
         q, qd = y[:n], y[n : 2 * n]
         theta, thetad = np.where(rigid, q, y[2 * n : 3 * n]), np.where(rigid, qd, y[3 * n : 4 * n])
         limit = self.arm.limits.effort
-        tau = np.clip(np.asarray(self._controller(t, theta, thetad), dtype=np.float64), -limit, limit)
+        tau = np.clip(self._controller(t, theta, thetad), -limit, limit)
         gears, friction = self.transmitted(q, qd, theta, thetad), self.friction(thetad)
         M, bias = self.mass_and_bias(q, qd)
         qdd = np.linalg.solve(M + np.diag(np.where(rigid, self.B, 0.0)), np.where(f, gears, tau - friction) - bias)

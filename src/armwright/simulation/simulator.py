@@ -22,8 +22,8 @@ from armwright.arrays import LARGEST_ANGLE, Array, ArrayLike, exact_shape, one_p
 from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.inertia_matrix import mass_matrix
-from armwright.errors import InvalidValueError, KindError, ShapeError, UnsupportedArmError, shown
-from armwright.simulation.controllers import Controller, no_effort
+from armwright.errors import InvalidValueError, KindError, UnsupportedArmError, shown
+from armwright.simulation.controllers import Controller, no_effort, returning
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.simulation.plant import Moment, Phase, Plant, Start
 from armwright.simulation.result import Brake, Event, JointState, Simulation, Status
@@ -88,7 +88,7 @@ def simulate(
     unlimited = np.full(arm.n, np.inf)
     plant = Plant(
         arm=arm,
-        controller=no_effort(arm) if controller is None else _held_to_shape(controller, arm.n),
+        controller=no_effort(arm) if controller is None else returning(controller, arm.n, "efforts of the controller"),
         brakes=tuple(brakes),
         lower=arm.limits.lower if stops else -unlimited,
         upper=arm.limits.upper if stops else unlimited,
@@ -110,22 +110,6 @@ def _check_kinds(controller: Controller | None, integrator: Integrator, brakes: 
         raise KindError(f"integrator: expected one such as Gill() or Adaptive(), got {shown(integrator)}")
     if not isinstance(brakes, Sequence) or not all(isinstance(brake, Brake) for brake in brakes):
         raise KindError(f"brakes: expected a list of Brake, got {shown(brakes)}")
-
-
-def _held_to_shape(controller: Controller, n: int) -> Controller:
-    """Return the controller, which is refused at the first moment at which it does not give n efforts."""
-
-    def efforts(t: float, q: Array, qd: Array) -> Array:
-        returned = controller(t, q, qd)
-        try:
-            array = np.asarray(returned, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise KindError(f"efforts of the controller at {t:g} s: expected numbers, got {shown(returned)}") from error
-        if array.shape != (n,):
-            raise ShapeError(f"efforts of the controller at {t:g} s: expected shape ({n},), got {array.shape}")
-        return array
-
-    return efforts
 
 
 def _check(plant: Plant, q: Array, qd: Array) -> None:

@@ -113,13 +113,14 @@ def test_nothing_contradicts(five_bar: Linkage) -> None:
 
 def test_told_by_the_command() -> None:
     """An estimate at rest says what its readings would contradict, as a table and as data."""
-    text = armwright("clearance", "estimate", "five-bar", EXAMPLE, columns=120).stdout
+    text = armwright("clearance", "estimate", "five-bar", EXAMPLE, "--friction", "0", columns=120).stdout
     errors = json.loads(armwright("clearance", "estimate", "five-bar", EXAMPLE, "--json").stdout)["model_errors"]
 
     lines = {line.split("  ")[0].strip(): line for line in text.splitlines()}
     assert "beyond 100 %" in lines["load at link3:J3"]
     assert "0.1 mm" in lines["length of link2"]
     assert "Smaller errors are taken for clearance: they shift the estimates in proportion" in " ".join(text.split())
+    assert "friction, which may hold journals beside their assumed positions, is left out" in " ".join(text.split())
     by_name = {error["name"]: error for error in errors}
     assert by_name["load at link3:J3"]["unit"] == "1"
     assert set(by_name["zero of link1"]["shifts"]) == {"J2", "J3", "J4"}

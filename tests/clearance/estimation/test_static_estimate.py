@@ -11,15 +11,20 @@ from armwright.clearance.estimation.static_estimate import (
     Estimate,
     closed_at_poses,
     estimate_at_rest,
+    friction_scatter,
     rest_matrix,
     rest_offsets,
 )
-from armwright.clearance.ideal import tip_sensitivity
+from armwright.clearance.ideal import close_pins, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.clearance.wear.contact_history import rotate
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
+from samples import Sample
 
 # Slow: a half of its tests is drawn.
 pytestmark = pytest.mark.part(0.5)
@@ -90,6 +95,54 @@ def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
     assert binom.sf(949, 1000, 0.9) + binom.cdf(850, 1000, 0.9) < 2e-6
     assert np.all((covered >= 850) & (covered <= 950))
     assert accuracy(estimate.values, true).mean() > WITH_NOISE
+
+
+def held_offsets(linkage: Linkage, poses: Array, clearances: Array, friction: float, rng: np.random.Generator) -> Array:
+    """Offsets (..., k, 2) of tips at rest whose journals friction holds anywhere in their cones."""
+    q = closed_at_poses(linkage, poses)
+    c = clearances[..., None, :]
+    rest = find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c))
+    angles = np.arctan(friction) * rng.uniform(-1.0, 1.0, rest.gaps.shape[:-1])
+    held = close_pins(linkage, rest.q, drives=q[:, list(linkage.driven)], gaps=rotate(rest.gaps, angles))
+    return tip_position(linkage, held) - tip_position(linkage, q)
+
+
+@pytest.mark.proof
+@pytest.mark.share(0.2)
+@pytest.mark.parametrize("friction", [0.05, 0.12])
+def test_intervals_cover_friction(five_bar: Linkage, sample: Sample, friction: float) -> None:
+    """Intervals of 90 % hold the truth in 85 to 95 of a hundred cases where friction holds the journals anywhere."""
+    # The seed was fixed before the intervals were written.
+    rng, count = np.random.default_rng(2205), sample.count(300)
+    true, poses = triples(rng, count), ALL_STARTS[::4]
+    offsets = held_offsets(five_bar, poses, true, friction, rng)
+    offsets += rng.normal(0.0, 2e-6, offsets.shape)
+
+    estimate = estimate_at_rest(five_bar, poses, offsets, 2e-6, friction=friction)
+
+    low, high = np.moveaxis(estimate.interval(0.9), -1, 0)
+    held = ((low <= true) & (true <= high)).sum(axis=0)
+    what = f"clearances at rest with a friction of {friction:g}, in intervals of 90 %"
+    sample.record(what, 3 * count, int(3 * count - held.sum()), held=", ".join(f"{x / count:.1%}" for x in held))
+    assert estimate.misfit.min() > 1e-4
+    low_share, high_share = (0.85, 0.95) if sample.whole else (0.7, 1.0)
+    assert np.all((held >= low_share * count) & (held <= high_share * count))
+    # What leaves the friction out is far too sure.
+    sure = estimate_at_rest(five_bar, poses, offsets, 2e-6)
+    assert (np.abs(sure.values - true) < 1.645 * np.sqrt(np.diag(sure.covariance))).mean() < 0.5
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.5])
+def test_scatter_by_friction(five_bar: Linkage, rng: np.random.Generator, friction: float) -> None:
+    """The covariance of tips whose journals friction holds, and their mean, are those of random journals."""
+    offsets = held_offsets(five_bar, STARTS[:1], np.tile(ARM_A, (2000, 1)), friction, rng)[:, 0]
+
+    scatter = friction_scatter(five_bar, closed_at_poses(five_bar, STARTS[:1]), ARM_A, friction)[0]
+
+    np.testing.assert_allclose(np.cov(offsets.T), scatter, atol=0.1 * np.trace(scatter))
+    angle = np.arctan(friction)
+    mean = rest_offsets(five_bar, STARTS[:1], ARM_A * np.sin(angle) / angle)[0]
+    np.testing.assert_allclose(offsets.mean(axis=0), mean, atol=5 * np.sqrt(np.trace(scatter) / 2000))
 
 
 def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) -> None:

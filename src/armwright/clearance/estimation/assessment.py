@@ -130,22 +130,27 @@ def _model_error_cells(error: ModelError) -> tuple[str, ...]:
     return (error.name, limit, f"{usual:g} {unit}", *(f"{x * usual / scale * 1e6:+z.1f}" for x in error.shifts))
 
 
-def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None = None) -> EstimateAssessment:
+def assess_rest(
+    linkage: Linkage, measured: RestMeasurement, noise: float | None = None, *, friction: float | None = None
+) -> EstimateAssessment:
     """Estimate clearances from readings of a resting tip.
 
     Args:
         linkage: that was measured.
         measured: the readings.
         noise: standard deviation of one coordinate of one reading; that of repeated readings without it [m].
+        friction: coefficient of friction, which holds the journals anywhere in their cones; that of the material when
+            left out, and 0 where the readings are to be taken as they are.
 
     Raises:
-        InvalidValueError: the noise is not above 0.
+        InvalidValueError: the noise is not above 0, or the friction below 0.
         ContradictionError: no clearances explain the readings.
         TooFewError: the poses do not determine all clearances.
     """
     if noise is not None:
         positive(noise, "noise", "m")
-    estimate = measured.estimate(linkage, noise)
+    mu = linkage.material.friction if friction is None else friction
+    estimate = measured.estimate(linkage, noise, friction=mu)
     noise_is_known = bool(noise or measured.noise)
     largest = float(estimate.values.max())
     misfit, widening = float(estimate.misfit), float(estimate.widening)
@@ -158,12 +163,14 @@ def assess_rest(linkage: Linkage, measured: RestMeasurement, noise: float | None
         *([] if noise_is_known else [_unknown_noise_note(estimate)]),
         *_fit_notes(misfit, widening),
     ]
-    friction = linkage.material.friction
-    if friction:
+    if mu > 0:
+        part, reach = 1 - float(np.mean(estimate.noise_shares)), math.atan(mu) * largest
         notes.append(
-            f"friction ({friction:g}) may hold a journal {math.atan(friction) * largest * 1e6:.2g} µm to either side "
-            f"of its assumed position; the intervals do not include that"
+            f"friction ({mu:g}) holds each journal anywhere within its cone, up to {reach * 1e6:.2g} µm to either side"
+            f", the same in all readings of a pose: {part:.0%} of the variances are of that"
         )
+    else:
+        notes.append("friction, which may hold journals beside their assumed positions, is left out of the intervals")
     notes += [
         f"{name} is indistinguishable from 0 mm: it is less than its standard deviation"
         for name in compress(estimate.names, estimate.at_bound)
@@ -236,6 +243,13 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
         ContradictionError: the measurement contradicts the model.
         TooFewError: a clearance is not identifiable.
     """
+    mean, covariance = read_estimate_moments(path, linkage)
+    draws = np.random.default_rng(0).multivariate_normal(mean, covariance, count)
+    return np.maximum(draws, _MIN_CLEARANCE)
+
+
+def read_estimate_moments(path: Path, linkage: Linkage) -> tuple[Array, Array]:
+    """Return mean (p,) [m] and covariance (p, p) [m²] of the clearances of an estimate; see ``read_estimate``."""
     text = read_text(path)
     try:
         data = json.loads(text)
@@ -248,7 +262,8 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
         if not (np.abs([mean, deviation]) <= _MAX_VALUE).all():
             raise ValueError  # noqa: TRY301 - turned into a FileFormatError below
         covariance = correlation * np.outer(deviation, deviation)
-        draws = np.random.default_rng(0).multivariate_normal(mean, covariance, count, check_valid="raise")[:, columns]
+        # It is one if numbers can be drawn by it.
+        np.random.default_rng(0).multivariate_normal(mean, covariance, 1, check_valid="raise")
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError, np.linalg.LinAlgError) as error:
         text = f"expected the output of `armwright clearance estimate --json` for {linkage.name}"
         raise FileFormatError(path, None, "", text) from error
@@ -259,7 +274,7 @@ def read_estimate(path: Path, linkage: Linkage, count: int) -> Array:
             f"{path}: the measurement does not identify {', '.join(unknown)}; a path cannot be corrected for an "
             f"unknown clearance: measure more poses or paths, or give --clearance"
         )
-    return np.maximum(draws, _MIN_CLEARANCE)
+    return mean[columns], covariance[np.ix_(columns, columns)]
 
 
 def _parameters(fit: Estimate | Posterior, mean: Array, identifiable: Mapping[str, bool]) -> dict[str, dict[str, Any]]:

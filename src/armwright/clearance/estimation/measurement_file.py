@@ -67,20 +67,23 @@ class RestMeasurement:
     readings: tuple[int, ...]
     noise: float | None
 
-    def estimate(self, linkage: Linkage, noise: float | None = None) -> Estimate:
+    def estimate(self, linkage: Linkage, noise: float | None = None, *, friction: float = 0.0) -> Estimate:
         """Return the clearances that explain the readings.
 
         Args:
             linkage: that was measured.
             noise: standard deviation of one coordinate of one reading; without it that of the readings themselves, and
                 where none of them differ, that of the residuals of the fit [m].
+            friction: see ``estimate_at_rest``.
 
         Raises:
             ContradictionError: no clearances explain the readings.
             TooFewError: the poses do not determine all clearances.
         """
         own = self.noise if noise is None else noise
-        estimate = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE, self.readings)
+        estimate = estimate_at_rest(
+            linkage, self.poses, self.offsets, own or LEAST_NOISE, self.readings, friction=friction
+        )
         if noise is None and self.noise is not None:
             estimate = attrs.evolve(estimate, noise_freedom=2.0 * sum(n - 1 for n in self.readings))
         freedom = estimate.degrees_of_freedom
@@ -90,6 +93,8 @@ class RestMeasurement:
                 estimate,
                 noise=estimate.noise * math.sqrt(ratio),
                 covariance=ratio * estimate.covariance,
+                scatter=ratio * estimate.scatter,
+                noise_shares=np.ones_like(estimate.noise_shares),
                 noise_freedom=float(freedom),
             )
         labels = [f"{axis} of {name}" for name in self.names for axis in "xy"]

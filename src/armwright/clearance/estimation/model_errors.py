@@ -19,7 +19,7 @@ from scipy.stats import chi2, f, ncf, ncx2
 
 from armwright.arrays import Array, ArrayLike
 from armwright.clearance.estimation.misfit import CONTRADICTION
-from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix
+from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix, whitening
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, Linkage
 from armwright.clearance.settings import contact_stiffness
@@ -85,15 +85,15 @@ def model_errors(
         noise_is_known: otherwise the residuals are taken for noise, and nothing contradicts the model.
     """
     q = closed_at_poses(linkage, poses)
-    weights = np.sqrt(np.repeat(estimate.readings, 2))
-    B = weights[:, None] * rest_matrix(linkage, q).reshape(-1, len(estimate.names))
+    white = whitening(estimate.scatter)
+    B = (white @ rest_matrix(linkage, q)).reshape(-1, len(estimate.names))
     Q, _ = np.linalg.qr(B)
-    noncentrality = _noncentrality(estimate.degrees_of_freedom, estimate.noise_freedom) if noise_is_known else np.inf
-    least = np.sqrt(noncentrality) * estimate.noise
+    noncentrality = _noncentrality(estimate.degrees_of_freedom, estimate.scatter_freedom) if noise_is_known else np.inf
+    least = float(np.sqrt(noncentrality))
     nominal = resting_tips(linkage, linkage, q, np.zeros(len(linkage.drives)), estimate.values)
 
     def remainder(shift: Array) -> float:
-        """Return the norm of the part of a weighted shift that no clearances explain."""
+        """Return the norm of the part of a shift, in standard deviations, that no clearances explain."""
         return float(np.linalg.norm(shift - Q @ (Q.T @ shift)))
 
     errors = []
@@ -101,11 +101,11 @@ def model_errors(
 
         def shift(change: float, kind: ErrorKind = kind) -> Array:
             tips = resting_tips(kind.changed(change), linkage, q, change * kind.zeros, estimate.values)
-            return weights * (tips - nominal).ravel()
+            return np.asarray(white @ (tips - nominal)[..., None], dtype=np.float64).ravel()
 
         slope = (shift(_STEP) - shift(-_STEP)) / (2 * _STEP)
         full = float(np.linalg.norm(slope))
-        if full < _NO_SHIFT:
+        if full * estimate.noise < _NO_SHIFT:
             continue
         limit = np.inf
         if np.isfinite(least) and remainder(slope) > _NEGLIGIBLE * full:
@@ -120,9 +120,10 @@ def _detection_limit(remainder: Callable[[float], float], linear: float, least: 
     """Return the change from which on, of either sign, a model error leaves the remainder needed to detect it.
 
     Args:
-        remainder: of the shift by a change, which no clearances explain [m]; a change of -1 removes the quantity.
+        remainder: of the shift by a change, in standard deviations, which no clearances explain; a change of -1 removes
+            the quantity.
         linear: the limit if the remainder is proportional to the change.
-        least: remainder needed [m].
+        least: remainder needed, in standard deviations.
     """
     size = linear
     for _ in range(_MAX_ROUNDS):

@@ -4,6 +4,10 @@ At rest the gap of a pin is its clearance in the direction of the force it carri
 linear in the clearances: offset = B c. A few poses yield more equations than clearances. The small nonlinear part, and
 the compliance of the walls, is corrected by iteration with the computed equilibrium.
 
+Friction holds a journal anywhere within its cone, ± atan μ to either side of that direction. Where it stays is unknown
+and counts as noise of the pose, the same for all readings after one approach: with any angle in the cone as likely as
+another, the offset of a pose has a scatter of its own, and its mean is a little smaller.
+
 Source:
     Spec of the clearance, 4.3.
 """
@@ -14,7 +18,7 @@ import attrs
 import numpy as np
 from scipy.optimize import nnls
 
-from armwright.arrays import Array, ArrayLike, Flags, floats, positive
+from armwright.arrays import Array, ArrayLike, Flags, floats, not_negative, positive
 from armwright.clearance.estimation.misfit import p_value, widening
 from armwright.clearance.ideal import close_pins, ideal_motion, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
@@ -24,6 +28,8 @@ from armwright.clearance.static_equilibrium import find_static_equilibrium, forc
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 
 _MAX_ROUNDS = 12
+# How often the scatter by friction is computed from the clearances.
+_SCATTERS = 2
 # The iteration ends when no clearance changes by more [m].
 _TOLERANCE = 1e-12
 # The lower bound of clearances during the iteration: contact needs one [m].
@@ -39,11 +45,13 @@ class Estimate:
     Attributes:
         names: of the parameters, p of them.
         values: (..., p) clearances [m].
-        covariance: (p, p) [m²].
+        covariance: (..., p, p), with leading axes only where friction makes it depend on the values [m²].
         singular_values: of the equations, largest first: the offset per unit of the combinations of clearances.
         residuals: (..., k, 2) of the offset of each pose [m].
         noise: standard deviation of one coordinate of one reading [m].
         readings: (k,) the number of readings whose mean is the offset of each pose.
+        scatter: (..., k, 2, 2) likewise, covariance of the offset of each pose by noise and friction [m²].
+        noise_shares: (..., p) likewise, share of the noise in the variance of each clearance; friction has the rest.
         noise_freedom: degrees of freedom of the estimated noise; infinite where it is known. Few widen the intervals.
     """
 
@@ -54,6 +62,8 @@ class Estimate:
     residuals: Array
     noise: float
     readings: Array
+    scatter: Array
+    noise_shares: Array
     noise_freedom: float = np.inf
 
     @property
@@ -64,12 +74,14 @@ class Estimate:
     @property
     def chi_square(self) -> Array:
         """(...) sum of squared residuals, in standard deviations."""
-        return np.asarray(np.sum(self.standardised**2, axis=(-2, -1)), dtype=np.float64)
+        whitened = whitening(self.scatter) @ self.residuals[..., None]
+        return np.asarray(np.sum(whitened**2, axis=(-3, -2, -1)), dtype=np.float64)
 
     @property
     def standardised(self) -> Array:
         """(..., k, 2) residuals in standard deviations of the offset of their pose."""
-        return np.asarray(self.residuals * np.sqrt(self.readings)[:, None] / self.noise, dtype=np.float64)
+        variances = np.diagonal(self.scatter, axis1=-2, axis2=-1)
+        return np.asarray(self.residuals / np.sqrt(variances), dtype=np.float64)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -79,7 +91,13 @@ class Estimate:
     @property
     def misfit(self) -> Array:
         """(...) probability of residuals as large where the model holds; if small, model or noise is wrong."""
-        return p_value(self.chi_square, self.degrees_of_freedom, self.noise_freedom)
+        return p_value(self.chi_square, self.degrees_of_freedom, self.scatter_freedom)
+
+    @property
+    def scatter_freedom(self) -> float:
+        """Degrees of freedom of the scatter of the poses (Welch and Satterthwaite): that of friction is known."""
+        own = 2 * self.noise**2 * float(np.mean(1 / self.readings))
+        return self.noise_freedom * (float(np.trace(self.scatter, axis1=-2, axis2=-1).mean()) / own) ** 2
 
     @property
     def widening(self) -> Array:
@@ -89,14 +107,17 @@ class Estimate:
     @property
     def deviations(self) -> Array:
         """(..., p) standard deviations, wider where the residuals exceed the noise [m]."""
-        own = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.widening[..., None] * own, dtype=np.float64)
+        return np.asarray(self.widening[..., None] * self._own_deviations, dtype=np.float64)
+
+    @property
+    def _own_deviations(self) -> Array:
+        return np.asarray(np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1)), dtype=np.float64)
 
     @property
     def correlation(self) -> Array:
-        """(p, p) correlation of the parameters."""
-        own = np.sqrt(np.diag(self.covariance))
-        return np.asarray(self.covariance / np.outer(own, own), dtype=np.float64)
+        """(..., p, p) correlation of the parameters."""
+        own = self._own_deviations
+        return np.asarray(self.covariance / (own[..., :, None] * own[..., None, :]), dtype=np.float64)
 
     @property
     def at_bound(self) -> Flags:
@@ -107,10 +128,10 @@ class Estimate:
         """Return (..., p, 2) the interval in which each clearance lies with the probability ``level`` [m]."""
         if not 0 < level < 1:
             raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
-        from scipy.stats import norm, t  # noqa: PLC0415 - a slow import
+        from scipy.stats import t  # noqa: PLC0415 - a slow import
 
-        distribution = norm() if np.isinf(self.noise_freedom) else t(self.noise_freedom)
-        half = distribution.ppf(0.5 + level / 2) * self.deviations
+        # By Welch and Satterthwaite: only the variance by the noise is uncertain.
+        half = t.ppf(0.5 + level / 2, self.noise_freedom / self.noise_shares**2) * self.deviations
         return np.stack([np.maximum(self.values - half, 0.0), self.values + half], axis=-1)
 
     def identifiable(self, width: float) -> tuple[bool, ...]:
@@ -131,10 +152,52 @@ def rest_matrix(linkage: Linkage, q: Array) -> Array:
     Raises:
         InvalidValueError: a pin carries no force there.
     """
+    return np.asarray(np.einsum("kapb,kpb->kap", tip_sensitivity(linkage, q), _contact_directions(linkage, q)))
+
+
+def friction_scatter(linkage: Linkage, q: Array, clearances: ArrayLike, friction: float) -> Array:
+    """Return the covariance of the resting tip where friction holds each journal anywhere in its cone.
+
+    Args:
+        linkage: with p pins.
+        q: (k, n) coordinates with closed pins.
+        clearances: (..., p) [m].
+        friction: coefficient of friction.
+
+    Returns:
+        (..., k, 2, 2) of each pose [m²].
+    """
+    direction, gains = _contact_directions(linkage, q), tip_sensitivity(linkage, q)
+    across = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+    mean, angle = _mean_part(friction), 2 * float(np.arctan(friction))
+    # Of the cosine and the sine of an angle that is anywhere within ± atan μ with the same probability.
+    shrinking = np.sinc(angle / np.pi) / 2
+    squares = floats(clearances, "clearances")[..., None, :, None, None] ** 2
+    parts = [
+        variance * np.einsum("kpa,kpb->kpab", shift, shift)
+        for variance, shift in (
+            (max(0.5 + shrinking - mean**2, 0.0), np.einsum("kapb,kpb->kpa", gains, direction)),
+            (max(0.5 - shrinking, 0.0), np.einsum("kapb,kpb->kpa", gains, across)),
+        )
+    ]
+    return np.asarray((squares * (parts[0] + parts[1])).sum(axis=-3), dtype=np.float64)
+
+
+def whitening(scatter: Array) -> Array:
+    """Return (..., 2, 2) the matrices that make offsets with covariances (..., 2, 2) unit noise."""
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(scatter)), dtype=np.float64)
+
+
+def _contact_directions(linkage: Linkage, q: Array) -> Array:
+    """Return (k, p, 2) the directions from bearing to journal at rest, without friction."""
     still = np.zeros((len(q), 2))
     reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
-    direction = reactions / force_magnitudes(linkage, reactions)[..., None]
-    return np.asarray(np.einsum("kapb,kpb->kap", tip_sensitivity(linkage, q), direction), dtype=np.float64)
+    return np.asarray(reactions / force_magnitudes(linkage, reactions)[..., None])
+
+
+def _mean_part(friction: float) -> float:
+    """Return the mean cosine of an angle anywhere within the friction cone."""
+    return float(np.sinc(np.arctan(friction) / np.pi))
 
 
 def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> Array:
@@ -156,7 +219,13 @@ def _offsets_at(linkage: Linkage, q: Array, clearances: Array) -> Array:
 
 
 def estimate_at_rest(
-    linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noise: float = 1e-6, readings: ArrayLike = 1.0
+    linkage: Linkage,
+    poses: ArrayLike,
+    offsets: ArrayLike,
+    noise: float = 1e-6,
+    readings: ArrayLike = 1.0,
+    *,
+    friction: float = 0.0,
 ) -> Estimate:
     """Return the clearances that explain the measured offsets of the resting tip.
 
@@ -166,6 +235,7 @@ def estimate_at_rest(
         offsets: (..., k, 2) of the tip there [m].
         noise: standard deviation of a coordinate of one reading [m].
         readings: (k,) the number of readings whose mean is each offset, which is its weight.
+        friction: coefficient of friction, which holds each journal anywhere in its cone, in all readings of a pose.
 
     Raises:
         ShapeError: poses and offsets do not fit.
@@ -177,52 +247,85 @@ def estimate_at_rest(
             f"expected (k, 2) poses and as many offsets, got shapes {positions.shape} and {measured.shape}"
         )
     positive(noise, "noise", "m")
+    not_negative(friction, "friction")
     counts = np.broadcast_to(floats(readings, "readings"), len(positions))
     if not np.all(counts >= 1):
         raise InvalidValueError(f"readings: expected at least 1 of each pose, got {counts.min():g}")
     names = tuple(linkage.clearances)
-    weights = np.sqrt(np.repeat(counts, 2))
     q = closed_at_poses(linkage, positions)
-    B = rest_matrix(linkage, q).reshape(-1, len(names))
-    singular = np.linalg.svd(B, compute_uv=False)
+    B = rest_matrix(linkage, q) * _mean_part(friction)
+    singular = np.linalg.svd(B.reshape(-1, len(names)), compute_uv=False)
     if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
         raise TooFewError(f"{len(positions)} poses do not determine {len(names)} clearances; take more, or others")
-    best, residuals = _fit_clearances(linkage, q, measured, B, weights)
-    weighted = weights[:, None] * B
+    own = scatter = (noise**2 / counts)[:, None, None] * np.eye(2)
+    fit = _fit_clearances(linkage, q, measured, B, scatter, _mean_part(friction))
+    for _ in range(_SCATTERS if friction > 0 else 0):
+        scatter = own + friction_scatter(linkage, q, fit[0], friction)
+        fit = _fit_clearances(linkage, q, measured, B, scatter, _mean_part(friction))
+    whitened = _whitened_matrix(B, scatter)
+    covariance = np.linalg.inv(np.swapaxes(whitened, -1, -2) @ whitened)
+    gain = covariance @ np.swapaxes(whitened, -1, -2)
+    by_noise = gain @ _block_diagonal(whitening(scatter) * (noise / np.sqrt(counts))[:, None, None])
     return Estimate(
         names=names,
-        values=best,
-        covariance=np.asarray(noise**2 * np.linalg.inv(weighted.T @ weighted), dtype=np.float64),
+        values=fit[0],
+        covariance=np.asarray(covariance, dtype=np.float64),
         singular_values=np.asarray(singular, dtype=np.float64),
-        residuals=residuals,
+        residuals=fit[1],
         noise=noise,
         readings=np.array(counts),
+        scatter=np.asarray(scatter, dtype=np.float64),
+        noise_shares=np.asarray(
+            (by_noise**2).sum(axis=-1) / np.diagonal(covariance, axis1=-2, axis2=-1), dtype=np.float64
+        ),
     )
 
 
-def _fit_clearances(linkage: Linkage, q: Array, offsets: Array, B: Array, weights: Array) -> tuple[Array, Array]:
+def _whitened_matrix(B: Array, scatter: Array) -> Array:
+    """Return (..., 2k, p) the equations B (k, 2, p), made unit noise."""
+    whitened = whitening(scatter) @ B
+    return np.asarray(whitened.reshape(*whitened.shape[:-3], -1, B.shape[-1]))
+
+
+def _block_diagonal(blocks: Array) -> Array:
+    """Return (..., 2k, 2k) matrices of blocks (..., k, 2, 2)."""
+    k = blocks.shape[-3]
+    matrix = np.zeros((*blocks.shape[:-3], k, 2, k, 2))
+    for i in range(k):
+        matrix[..., i, :, i, :] = blocks[..., i, :, :]
+    return matrix.reshape(*blocks.shape[:-3], 2 * k, 2 * k)
+
+
+def _fit_clearances(  # noqa: PLR0917 - one system of equations
+    linkage: Linkage, q: Array, offsets: Array, B: Array, scatter: Array, mean_part: float
+) -> tuple[Array, Array]:
     """Return the clearances (..., p) that explain offsets (..., k, 2) best, and the residuals (..., k, 2) [m].
 
-    The weights (2k,) are those of the equations B (2k, p), at closed coordinates (k, n).
+    The covariances (..., k, 2, 2) are those of the offsets, with equations B (k, 2, p), at closed coordinates (k, n).
+    The mean part of the clearances displaces the tip.
     """
-    weighted = weights[:, None] * B
+    white, weighted = whitening(scatter), _whitened_matrix(B, scatter)
 
-    def square(residuals: Array) -> Array:
-        return np.asarray(np.sum((weights.reshape(-1, 2) * residuals) ** 2, axis=(-2, -1)), dtype=np.float64)
+    def whitened(residuals: Array) -> Array:
+        product = white @ residuals[..., None]
+        return np.asarray(product.reshape(*residuals.shape[:-2], -1), dtype=np.float64)
 
     def step(c: Array, residuals: Array) -> Array:
         """Solve the least squares about c, with no clearance below the smallest."""
-        goal = residuals.reshape(*residuals.shape[:-2], -1) + (c - _MIN_CLEARANCE) @ B.T
-        rows = [nnls(weighted, weights * row)[0] for row in goal.reshape(-1, len(B))]
+        goal = whitened(residuals) + np.einsum("...ip,...p->...i", weighted, c - _MIN_CLEARANCE)
+        matrices = np.broadcast_to(weighted, (*c.shape[:-1], *weighted.shape[-2:])).reshape(-1, *weighted.shape[-2:])
+        rows = [nnls(*system)[0] for system in zip(matrices, goal.reshape(-1, goal.shape[-1]), strict=True)]
         return np.reshape(rows, c.shape) + _MIN_CLEARANCE
 
-    c = step(np.full((*offsets.shape[:-2], B.shape[1]), _MIN_CLEARANCE), offsets)
+    c = step(np.full((*offsets.shape[:-2], B.shape[-1]), _MIN_CLEARANCE), offsets)
     best, smallest, converged = c, np.full_like(offsets, np.inf), False
+    least = np.full(offsets.shape[:-2], np.inf)
     for _ in range(_MAX_ROUNDS):
-        residuals = offsets - _offsets_at(linkage, q, c)
+        residuals = offsets - _offsets_at(linkage, q, mean_part * c)
+        square = (whitened(residuals) ** 2).sum(axis=-1)
         # The last round need not be the best.
-        better = square(residuals) < square(smallest)
-        best = np.where(better[..., None], c, best)
+        better = square < least
+        best, least = np.where(better[..., None], c, best), np.where(better, square, least)
         smallest = np.where(better[..., None, None], residuals, smallest)
         if converged:
             break

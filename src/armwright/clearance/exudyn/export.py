@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from armwright.arrays import Array, floats
+from armwright.arrays import floats
 from armwright.clearance.contact import ImpactLaw
+from armwright.clearance.drive_tables import csv_text, drive_table
 from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage
 from armwright.clearance.placement import Placement
@@ -22,8 +23,6 @@ from armwright.errors import InvalidValueError
 
 # The only impact law that both programs have.
 IMPACT_LAW: ImpactLaw = "carvalho-martins"
-# Both sides of a jump stand so far beside it [s].
-_BESIDE = 1e-10
 
 
 def exudyn_files(scenario: Scenario) -> dict[str, str]:
@@ -41,33 +40,13 @@ def exudyn_files(scenario: Scenario) -> dict[str, str]:
     linkage = scenario.linkage
     run = simulate(scenario, linkage.clearance_array(None))
     heads = [f"{drive.body}_{'rad' if drive.kind == 'motion' else 'Nm'}" for drive in linkage.drives]
+    angles = scenario.ideal.q[:, list(linkage.driven)]
     return {
         "run_linkage.py": resources.files("armwright.clearance.exudyn").joinpath("run_linkage.py").read_text("utf-8"),
         "linkage.json": json.dumps(_model(scenario, run), indent=2) + "\n",
-        "drives.csv": _csv(["time_s", *heads], _drives(scenario)),
-        "reference.csv": _csv(["time_s", "tip_x_m", "tip_y_m"], np.column_stack([run.time, run.tip])),
+        "drives.csv": csv_text(["time_s", *heads], drive_table(scenario, angles)),
+        "reference.csv": csv_text(["time_s", "tip_x_m", "tip_y_m"], np.column_stack([run.time, run.tip])),
     }
-
-
-def _drives(scenario: Scenario) -> Array:
-    """Return (k, 1 + d) times and efforts, or angles of drives whose motion is prescribed.
-
-    At a jump stands the mean of both sides, between them: an implicit rule that takes the end of one step for the start
-    of the next keeps its order so.
-    """
-    linkage, table = scenario.linkage, scenario.table
-    starts = np.concatenate([[0.0], np.cumsum(scenario.lengths)])
-    before, after = np.concatenate([table[:1, 0], table[:, 2]]), np.concatenate([table[:, 0], table[-1:, 2]])
-    jumps = np.flatnonzero(np.any(before != after, axis=-1))
-    times = np.concatenate([starts, starts[jumps] - _BESIDE, starts[jumps] + _BESIDE])
-    values = np.concatenate([(before + after) / 2, before[jumps], after[jumps]])
-    order = np.argsort(times, kind="stable")
-    times, values = times[order], values[order]
-    steps = np.arange(scenario.steps + 1) * scenario.h
-    for k, (drive, number) in enumerate(zip(linkage.drives, linkage.driven, strict=True)):
-        if drive.kind == "motion":
-            values[:, k] = np.interp(times, steps, scenario.ideal.q[:, number])
-    return np.column_stack([times, values])
 
 
 def _check(scenario: Scenario) -> None:
@@ -160,8 +139,3 @@ def _end(linkage: Linkage, point: BodyPoint) -> dict[str, Any]:
     """Return a point of a body from its centre; on the ground from the origin."""
     centre = np.zeros(2) if point.body == GROUND else linkage.body(point.body).centre
     return {"body": point.body, "point": (linkage.point(point) - centre).tolist()}
-
-
-def _csv(heads: list[str], rows: Array) -> str:
-    lines = [",".join(heads), *(",".join(f"{x:.17g}" for x in row) for row in rows)]
-    return "\n".join(lines) + "\n"

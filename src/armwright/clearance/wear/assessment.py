@@ -6,7 +6,7 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -22,8 +22,9 @@ from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from armwright.clearance.wear.contact_history import simulated_contact
 from armwright.clearance.wear.life import MAX_STEP, WearLife, wear_life
-from armwright.clearance.wear.worn_stroke import Stroke
+from armwright.clearance.wear.worn_stroke import Stroke, lean
 from armwright.clearance.wear.worn_surfaces import WearLaw, mean_growth
+from armwright.clearance.worn_walls import WornWalls
 from armwright.errors import one_of
 from armwright.files.result_table import ResultTable
 
@@ -38,17 +39,23 @@ _WORN = 1e-3
 
 
 class SimulatedWork(NamedTuple):
-    """Force times sliding distance of a stroke of the new linkage, simulated with its impacts.
+    """Force times sliding distance of a stroke, simulated with its impacts, beside that of the leaning stroke.
 
     Attributes:
+        strokes: after which it was simulated.
+        leaning: (p,) of the leaning stroke [N m].
         mean: (p,) over indistinguishable runs [N m].
         spread: (p,) their standard deviation [N m].
         impacts: (p,) mean number of impacts.
+        peaks: (p,) mean of the largest forces [N].
     """
 
+    strokes: float
+    leaning: Array
     mean: Array
     spread: Array
     impacts: Array
+    peaks: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -58,14 +65,14 @@ class WearAssessment:
     Attributes:
         life: with the steps asked for.
         finer: the same strokes with steps of half the depth.
-        simulated: a stroke with its impacts.
+        simulated: strokes with their impacts, of the new linkage first.
         spread: standard deviation of the logarithm of the wear coefficient.
         limits: of ``AP``, ``RP`` and ``path`` [m].
     """
 
     life: WearLife
     finer: WearLife
-    simulated: SimulatedWork
+    simulated: tuple[SimulatedWork, ...]
     spread: float
     limits: Mapping[str, float]
 
@@ -100,9 +107,6 @@ class WearAssessment:
                 "pin": pin.name,
                 "clearance": pin.clearance,
                 "work": float(work[i]),
-                "simulated_work": float(self.simulated.mean[i]),
-                "simulated_work_spread": float(self.simulated.spread[i]),
-                "impacts": float(self.simulated.impacts[i]),
                 "mean_growth": mean_growth(law.coefficient, float(work[i]), pin.journal_radius, arc, law.width)
                 if arc
                 else None,
@@ -112,6 +116,20 @@ class WearAssessment:
                 "journal_depth_error": abs(float(last.journal[i].max() - finer.journal[i].max())),
                 "volume": float(self.life.volumes[-1, i]),
             }
+
+    def impacts(self) -> Iterator[dict[str, Any]]:
+        """Give each pin in each simulated stroke, beside the leaning stroke, in SI units."""
+        for work in self.simulated:
+            for i, pin in enumerate(self.linkage.pins):
+                yield {
+                    "strokes": work.strokes,
+                    "pin": pin.name,
+                    "leaning_work": float(work.leaning[i]),
+                    "work": float(work.mean[i]),
+                    "work_spread": float(work.spread[i]),
+                    "impacts": float(work.impacts[i]),
+                    "peak_force": float(work.peaks[i]),
+                }
 
     def as_data(self) -> dict[str, Any]:
         """Return the life as plain data in SI units."""
@@ -125,6 +143,7 @@ class WearAssessment:
             "bearing_share": life.law.bearing_share,
             "pressure": life.law.pressure,
             "pins": list(self.pins()),
+            "simulated": list(self.impacts()),
             "strokes": life.strokes.tolist(),
             "errors": {
                 name: {"values": values.tolist(), "test_spread": spread.tolist(), "step_error": errors[name]}
@@ -161,24 +180,38 @@ class WearAssessment:
         return notes
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the pins, the errors of the tip, and the lives."""
+        """Give the pins, their impacts, the errors of the tip, and the lives."""
         yield ResultTable(
             title="Pins",
             heads=(
-                "pin", "F ds, leaning N m", "simulated N m", "± N m", "mean growth nm/stroke",
-                "bearing mm", "± mm", "journal mm", "± mm",
+                "pin", "F ds, leaning N m", "mean growth nm/stroke", "bearing mm", "± mm", "journal mm", "± mm",
             ),
             rows=[
                 (
                     pin["pin"],
-                    *(f"{pin[name]:.4f}" for name in ("work", "simulated_work", "simulated_work_spread")),
+                    f"{pin['work']:.4f}",
                     f"{pin['mean_growth'] * 1e9:.3g}" if pin["mean_growth"] is not None else "",
                     *(f"{pin[name] * 1e3:.4f}" for name in _DEPTHS),
                 )
                 for pin in self.pins()
             ],
-            numbers=range(1, 9),
+            numbers=range(1, 7),
         )  # fmt: skip
+        yield ResultTable(
+            title="Strokes with impacts",
+            heads=("after strokes", "pin", "F ds, leaning N m", "simulated N m", "± N m", "impacts", "largest N"),
+            rows=[
+                (
+                    f"{row['strokes']:.4g}",
+                    row["pin"],
+                    *(f"{row[name]:.4f}" for name in ("leaning_work", "work", "work_spread")),
+                    f"{row['impacts']:.3g}",
+                    f"{row['peak_force']:.4g}",
+                )
+                for row in self.impacts()
+            ],
+            numbers=(0, *range(2, 7)),
+        )
         errors = self.step_errors()
         yield ResultTable(
             title="Tip",
@@ -204,16 +237,30 @@ class WearAssessment:
         )
 
 
-def simulated_work(linkage: Linkage, path: Path) -> SimulatedWork:
+def simulated_work(life: WearLife, path: Path, strokes: float) -> SimulatedWork:
     """Return force times sliding distance of a simulated stroke, over indistinguishable runs.
 
+    Args:
+        life: of the linkage.
+        path: of its strokes.
+        strokes: of the life that come before.
+
     Raises:
-        InvalidValueError: see ``simulate`` and ``simulated_contact``.
+        InvalidValueError: see ``WearLife.surfaces_after``, ``simulate`` and ``simulated_contact``.
     """
+    linkage, surfaces = life.stroke.linkage, life.surfaces_after(strokes)
+    worn = WornWalls.of(linkage, surfaces.bearing, surfaces.journal) if strokes > 0 else None
     scenario = prepare_scenario(linkage, path, Settings(sample=min(_SAMPLE, path.duration / 100), step=_SAMPLE))
-    runs = simulate(scenario, perturb_clearances(linkage.clearance_array(None), _RUNS - 1))
+    runs = simulate(scenario, perturb_clearances(linkage.clearance_array(None), _RUNS - 1), worn=worn)
     works = np.array([simulated_contact(select_run(runs, k)).work for k in range(_RUNS)])
-    return SimulatedWork(works.mean(axis=0), works.std(axis=0, ddof=1), runs.impacts.mean(axis=0))
+    return SimulatedWork(
+        strokes=strokes,
+        leaning=lean(life.stroke, life.law, surfaces).history.work,
+        mean=works.mean(axis=0),
+        spread=works.std(axis=0, ddof=1),
+        impacts=runs.impacts.mean(axis=0),
+        peaks=runs.peaks.mean(axis=0),
+    )
 
 
 def assess_wear(
@@ -225,6 +272,7 @@ def assess_wear(
     limits: Mapping[str, float] | None = None,
     steps: int = 20,
     max_step: float = MAX_STEP,
+    simulate_after: Sequence[float] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> WearAssessment:
     """Wear a linkage along a path, with the errors of all numbers.
@@ -237,17 +285,17 @@ def assess_wear(
         limits: of ``AP``, ``RP`` and ``path`` [m].
         steps: of the life.
         max_step: the largest depth of a step, as a part of the clearance of its pin.
+        simulate_after: strokes of the life after which one is simulated with its impacts, beside the first and last.
         progress: called with the number of steps made, and of all.
 
     Raises:
-        InvalidValueError: a body is elastic, or see ``wear_life``.
+        InvalidValueError: a body is elastic, or see ``wear_life`` and ``simulated_work``.
         UnknownNameError: there is no such measure.
     """
     refuse_rods("wear", linkage.rods)
     not_negative(spread, "spread of the wear coefficient")
     for name, limit in (limits or {}).items():
         positive(limit, f"limit of {one_of('measure', name, ('AP', 'RP', 'path'))}", "m")
-    simulated = simulated_work(linkage, path)
     stroke, total = Stroke.of(linkage, path), 3 * steps
 
     def after(done: int) -> Callable[[int, int], None] | None:
@@ -255,5 +303,6 @@ def assess_wear(
 
     life = wear_life(stroke, law, steps=steps, max_step=max_step, progress=after(0))
     end = float(life.strokes[-1])
+    simulated = tuple(simulated_work(life, path, strokes) for strokes in sorted({0.0, *simulate_after, end}))
     finer = wear_life(stroke, law, steps=4 * steps, max_step=max_step / 2, until=end, progress=after(steps))
     return WearAssessment(life=life, finer=finer, simulated=simulated, spread=spread, limits=limits or {})

@@ -102,31 +102,25 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
     q, qd = simulation.q[:rows], simulation.qd[:rows]
     if not np.all(np.isfinite(q)):
         raise InvalidValueError(f"{linkage.name}: the run diverged, so that nothing can be said of its wear")
-    angles, gaps = pin_angles(linkage, q, qd), simulation.gaps[:rows]
+    angles, gaps = pin_angles(linkage, q, qd), simulation.gaps
+    gradients = simulation.contact_geometry(gaps)[1][:rows]
+    gaps, outward = gaps[:rows], gradients / np.linalg.norm(gradients, axis=-1, keepdims=True)
     placement = Placement(linkage, list(q.T), list(qd.T))
-    slips = []
-    for i, pin in enumerate(linkage.pins):
-        velocity = placement.point(pin.journal).velocity.minus(placement.point(pin.bearing).velocity)
-        moved = np.stack(np.broadcast_arrays(*velocity, q[:, 0])[:2], axis=-1)
-        spins = angles.journal_spin[:, i], angles.bearing_spin[:, i]
-        slips.append(_slip(pin.journal_radius, gaps[:, i], moved, *spins))
-    outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
+    points = [(placement.point(pin.journal), placement.point(pin.bearing)) for pin in linkage.pins]
+    moved = [np.broadcast_arrays(*journal.velocity.minus(bearing.velocity), q[:, 0])[:2] for journal, bearing in points]
+    velocities = np.stack([np.stack(velocity, axis=-1) for velocity in moved], axis=1)
     return ContactHistory(
         time=simulation.time[:rows],
         forces=rotate(outward * simulation.forces[:rows, :, None], -angles.bearing),
-        slips=np.stack(slips, axis=-1),
+        slips=_slips(linkage, gaps, outward, velocities, angles),
         rotations=angles.journal - angles.bearing,
     )
 
 
 def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles) -> Array:
     """Return (s, p) sliding velocities [m/s] of journals whose gaps (s, p, 2) in the ground's axes are known [m]."""
-    velocities = np.gradient(gaps, time, axis=0)
-    slips = []
-    for i, pin in enumerate(linkage.pins):
-        spins = angles.journal_spin[:, i], angles.bearing_spin[:, i]
-        slips.append(_slip(pin.journal_radius, gaps[:, i], velocities[:, i], *spins))
-    return np.stack(slips, axis=-1)
+    outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
+    return _slips(linkage, gaps, outward, np.gradient(gaps, time, axis=0), angles)
 
 
 def rotate(vectors: Array, angles: Array) -> Array:
@@ -135,8 +129,9 @@ def rotate(vectors: Array, angles: Array) -> Array:
     return np.stack([c * vectors[..., 0] - s * vectors[..., 1], s * vectors[..., 0] + c * vectors[..., 1]], axis=-1)
 
 
-def _slip(radius: float, gap: Array, velocity: Array, journal_spin: Array, bearing_spin: Array) -> Array:
-    """Return (s,) the velocity of the surface of a journal of this radius along the wall that it touches."""
-    distance = np.linalg.norm(gap, axis=-1)
-    along = np.stack([-gap[:, 1], gap[:, 0]], axis=-1) / distance[:, None]
-    return np.asarray((velocity * along).sum(axis=-1) + journal_spin * radius - bearing_spin * (radius + distance))
+def _slips(linkage: Linkage, gaps: Array, outward: Array, velocities: Array, angles: PinAngles) -> Array:
+    """Return (s, p) velocities of the surfaces of journals along walls of these normals (s, p, 2)."""
+    radii = np.array([pin.journal_radius for pin in linkage.pins])
+    along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+    wall = radii + (gaps * outward).sum(axis=-1)
+    return np.asarray((velocities * along).sum(axis=-1) + angles.journal_spin * radii - angles.bearing_spin * wall)

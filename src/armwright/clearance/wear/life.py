@@ -13,7 +13,7 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, integer, positive
+from armwright.arrays import Array, integer, not_negative, positive
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.wear.worn_stroke import Stroke, lean, leaning_growth, peak_pressures, tip_errors
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
@@ -69,6 +69,21 @@ class WearLife:
         worst = {"AP": self.accuracy.max(axis=-1), "RP": self.repeatability.max(axis=-1)}
         tested = {name: (x.mean(axis=-1), x.std(axis=-1, ddof=1)) for name, x in worst.items()}
         return {**tested, "path": (self.path.max(axis=-1), np.zeros(len(self.path)))}
+
+    def surfaces_after(self, strokes: float) -> WornSurfaces:
+        """Return the surfaces after strokes of the life, between whose states depths grow evenly.
+
+        Raises:
+            InvalidValueError: the life does not last so long.
+        """
+        end = float(self.strokes[-1])
+        if not_negative(strokes, "strokes") > end:
+            raise InvalidValueError(f"strokes: expected at most {end:.4g}, which the life lasts, got {strokes:g}")
+        k = int(np.clip(np.searchsorted(self.strokes, strokes) - 1, 0, len(self.strokes) - 2))
+        first, second = self.surfaces[k : k + 2]
+        part = (strokes - self.strokes[k]) / (self.strokes[k + 1] - self.strokes[k])
+        growth = WornSurfaces(bearing=second.bearing - first.bearing, journal=second.journal - first.journal)
+        return first.plus(growth, part)
 
     def strokes_to(self, measure: str, limit: float) -> float:
         """Return the strokes after which a measure passes a limit [m]; 0 for a new linkage beyond it, else infinite."""

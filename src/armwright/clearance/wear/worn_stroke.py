@@ -172,6 +172,19 @@ def tip_errors(stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, *, seed: in
     return TipErrors(accuracy, repeatability, path)
 
 
+def resting_gaps(linkage: Linkage, law: WearLaw, surfaces: WornSurfaces, q: Array) -> Array:
+    """Return (n, p, 2) from bearings to journals of worn pins at rest, in the ground's axes [m].
+
+    Args:
+        linkage: with p new pins.
+        law: of pressure and wear.
+        surfaces: worn.
+        q: (n, c) coordinates with closed pins, at which the drives are locked.
+    """
+    still = np.zeros_like(q)
+    return _rest(linkage, law, surfaces, (q, still, still), 0.0).gaps
+
+
 class _Rest(NamedTuple):
     q: Array
     gaps: Array

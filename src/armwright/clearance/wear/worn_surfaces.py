@@ -22,7 +22,7 @@ from armwright.errors import InvalidValueError, one_of
 Pressure: TypeAlias = Literal["hertz", "winkler"]
 PRESSURES: tuple[Pressure, ...] = ("hertz", "winkler")
 # Fewer bins do not tell a worn place from a round wall; more take long.
-_FEWEST, _MOST = 36, 3600
+FEWEST_BINS, MOST_BINS = 36, 3600
 # A contact narrower than two bins to each side is made as wide: no profile tells it.
 _NARROWEST = 2
 
@@ -57,8 +57,8 @@ class WearLaw:
         one_of("pressure", self.pressure, PRESSURES)
         if not 0 <= not_negative(self.bearing_share, "bearing share") <= 1:
             raise InvalidValueError(f"bearing share: expected 0 to 1, got {self.bearing_share:g}")
-        if integer(self.bins, "bins", least=_FEWEST) > _MOST:
-            raise InvalidValueError(f"bins: expected {_FEWEST} to {_MOST}, got {self.bins}")
+        if integer(self.bins, "bins", least=FEWEST_BINS) > MOST_BINS:
+            raise InvalidValueError(f"bins: expected {FEWEST_BINS} to {MOST_BINS}, got {self.bins}")
 
     def bin_area(self, radius: float) -> float:
         """Return the area of a bin of a journal of this radius [m²]."""

@@ -38,12 +38,25 @@ function hole(size) {
 
 function drawWay(pin, i, { room, middle }, last) {
   const at = (row) => [
-    middle[0] + (room * row[2 * i]) / pin.clearance_um,
-    middle[1] - (room * row[2 * i + 1]) / pin.clearance_um,
+    middle[0] + (room * row[2 * i]) / pin.reach_um,
+    middle[1] - (room * row[2 * i + 1]) / pin.reach_um,
   ];
   const places = data.gaps_um.map(at);
   polyline(places, colours.quiet, 0.8, { alpha: 0.35 });
   polyline(places.slice(0, last + 1), colours.hues[i % HUES], 1.5);
+}
+
+// The worn wall as it stands now; there are fewer outlines than rows.
+function drawOutline(pin, { room, middle }, [i, , s]) {
+  const last = pin.outlines_um.length - 1;
+  const at = Math.min(last, ((i + s) / Math.max(1, data.t.length - 1)) * last);
+  const low = Math.floor(at);
+  const flat = blend(pin.outlines_um, [low, Math.min(low + 1, last), at - low]);
+  const points = [];
+  for (let k = 0; k < flat.length; k += 2) {
+    points.push([middle[0] + (room * flat[k]) / pin.reach_um, middle[1] - (room * flat[k + 1]) / pin.reach_um]);
+  }
+  polyline(points, colours.ink, 1.2, { close: true });
 }
 
 function drawArrow([x, y], [dx, dy], length, colour, part) {
@@ -70,14 +83,15 @@ function drawBearing({ pin, view }, i, place) {
   const [force, flies] = [forceAt(place, i), fliesAt(place, i)];
   disc(middle, wall + RING * part, colours.metal);
   disc(middle, wall, colours.sky, colours.ink, 1.5);
-  const centre = [middle[0] + (room * gap[0]) / pin.clearance_um, middle[1] - (room * gap[1]) / pin.clearance_um];
+  const centre = [middle[0] + (room * gap[0]) / pin.reach_um, middle[1] - (room * gap[1]) / pin.reach_um];
   pen.globalAlpha = 0.4;
   disc(centre, journal, flies ? null : forceColour(force));
   pen.globalAlpha = 1;
   disc(centre, journal, null, flies ? colours.quiet : forceColour(force), 1.8);
   pen.setLineDash([3, 3]);
-  disc(middle, room, null, colours.quiet, 1);
+  disc(middle, (room * pin.clearance_um) / pin.reach_um, null, colours.quiet, 1);
   pen.setLineDash([]);
+  if (pin.outlines_um.length) drawOutline(pin, shape, place);
   drawWay(pin, i, shape, place[0]);
   disc(centre, 3.5, colours.ink);
   const distance = Math.hypot(...gap);

@@ -1,0 +1,1 @@
+"""Linkages without clearance as models of MuJoCo."""

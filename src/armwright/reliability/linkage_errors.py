@@ -1,0 +1,255 @@
+"""The error of the resting tip of a linkage whose clearances and other dimensions are random.
+
+Near the mean clearances the error is linear in all deviations. The clearances are normal or lognormal, and may be
+correlated, as those of an estimate; the other dimensions are normal and independent.
+
+Source:
+    Spec of the life, 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+from scipy.special import ndtr
+
+from armwright.arrays import Array, ArrayLike, floats, not_negative, read_only
+from armwright.clearance.dimensions import dimensions_of
+from armwright.clearance.ideal import tip_position, tip_sensitivity
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.sensitivities import rest_sensitivities
+from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.errors import InvalidValueError, ShapeError, one_of
+from armwright.reliability.linear_error import LinearError
+from armwright.reliability.tip_errors import sampled_tip_errors
+
+Shape: TypeAlias = Literal["normal", "lognormal"]
+SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
+# An eigenvalue of a covariance below this part of the largest is rounding.
+_FLAT = 1e-12
+# Equilibria that are solved at once.
+_BLOCK = 20_000
+# The least clearance that has a direction [m].
+_LEAST = 1e-9
+
+
+def _numbers(value: ArrayLike) -> Array:
+    return read_only(floats(value, "clearances"))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RandomClearances:
+    """The clearances of many linkages that are built alike.
+
+    Attributes:
+        mean: (p,) [m].
+        covariance: (p, p) [m²].
+        shape: ``normal``, where a clearance below 0 counts as 0, or ``lognormal``.
+    """
+
+    mean: Array = attrs.field(converter=_numbers)
+    covariance: Array = attrs.field(converter=_numbers)
+    shape: Shape = "normal"
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse numbers that no clearances have."""
+        p = len(self.mean)
+        if self.mean.ndim != 1 or self.covariance.shape != (p, p):
+            raise ShapeError(
+                f"clearances: expected mean (p,), covariance (p, p), got {self.mean.shape}, {self.covariance.shape}"
+            )
+        one_of("shape", self.shape, SHAPES)
+        least = 0.0 if self.shape == "normal" else np.finfo(float).tiny
+        if not (self.mean >= least).all():
+            raise InvalidValueError(
+                f"clearances: expected means {'of 0 or more' if self.shape == 'normal' else 'above 0'}, got "
+                f"{self.mean.min() * 1e3:g} mm"
+            )
+        values = np.linalg.eigvalsh(self.covariance)
+        if not np.allclose(self.covariance, self.covariance.T, rtol=1e-9, atol=0) or (
+            p and values[0] < -1e-9 * max(float(values[-1]), 1e-300)
+        ):
+            raise InvalidValueError("clearances: expected a symmetric covariance without negative eigenvalues")
+        if self.shape == "lognormal" and (self._relative <= -1).any():
+            raise InvalidValueError("clearances: no lognormal ones have correlations that are so negative")
+
+    @property
+    def deviations(self) -> Array:
+        """(p,) standard deviations [m]."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def below_zero(self) -> float:
+        """The largest probability that a clearance would be below 0, where it counts as 0."""
+        if self.shape == "lognormal":
+            return 0.0
+        sizes = np.where(self.deviations > 0, self.deviations, np.inf)
+        return float(ndtr(-self.mean / sizes).max(where=self.deviations > 0, initial=0.0))
+
+    @property
+    def _relative(self) -> Array:
+        return np.asarray(self.covariance / np.outer(self.mean, self.mean))
+
+    @property
+    def _root(self) -> Array:
+        """A root of the covariance, (p, p): of clearances, or of their logarithms."""
+        matrix = self.covariance if self.shape == "normal" else np.log1p(self._relative)
+        if not np.any(matrix - np.diag(np.diag(matrix))):
+            return np.diag(np.sqrt(np.diag(matrix)))
+        values, axes = np.linalg.eigh(matrix)
+        return np.asarray(axes * np.sqrt(np.where(values > _FLAT * values[-1], values, 0.0)))
+
+    @property
+    def linear(self) -> Array:
+        """(p, p) derivatives by standard normal numbers at 0, where clearances are at their mean or median [m]."""
+        return self._root if self.shape == "normal" else self.mean[:, None] * self._root
+
+    def values(self, z: Array) -> Array:
+        """Return clearances (..., p) for standard normal numbers (..., p), none of them below 0 [m]."""
+        shifts = z @ self._root.T
+        if self.shape == "normal":
+            return np.maximum(self.mean + shifts, 0.0)
+        return np.asarray(self.mean * np.exp(shifts - np.diag(np.log1p(self._relative)) / 2))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RandomLinkage:
+    """A linkage of random dimensions at poses of rest.
+
+    Attributes:
+        linkage: with m pins.
+        q: (p, n) coordinates with closed pins, at which the drives are locked.
+        clearances: of its m pins.
+        deviations: standard deviations of other dimensions by name, as ``dimensions_of`` has them [m, rad, kg, N].
+        offset: (p, 2) error of the tip with mean dimensions [m].
+        jacobian: (p, 2, m) its derivatives by the clearances.
+        others: (p, 2, k) its derivatives by the other dimensions.
+    """
+
+    linkage: Linkage
+    q: Array
+    clearances: RandomClearances
+    deviations: Mapping[str, float]
+    offset: Array
+    jacobian: Array
+    others: Array
+
+    @classmethod
+    def at(
+        cls,
+        linkage: Linkage,
+        q: ArrayLike,
+        clearances: RandomClearances,
+        deviations: Mapping[str, float] | None = None,
+    ) -> RandomLinkage:
+        """Return a linkage at poses of rest, linear about its mean clearances.
+
+        Args:
+            linkage: with m pins.
+            q: (p, n) coordinates with closed pins, at which the drives are locked.
+            clearances: of its m pins.
+            deviations: standard deviations of other dimensions by name [m, rad, kg, N].
+
+        Raises:
+            InvalidValueError: a pin carries no force at rest, or a number is out of its range.
+            UnknownNameError: there is no such dimension, beside the clearances.
+        """
+        given = dict(deviations or {})
+        known = [each.name for each in dimensions_of(linkage) if each.kind != "clearance"]
+        for name, value in given.items():
+            not_negative(value, f"deviation of {one_of('dimension', name, known)}")
+        closed = np.atleast_2d(floats(q, "q"))
+        if len(clearances.mean) != len(linkage.pins):
+            raise ShapeError(f"clearances: expected one for each pin, {len(linkage.pins)}")
+        found = rest_sensitivities(linkage, closed, clearances.mean)
+        columns = [found.column(name) for name in given]
+        return cls(
+            linkage=linkage,
+            q=closed,
+            clearances=clearances,
+            deviations=given,
+            offset=found.tip - tip_position(linkage, closed),
+            jacobian=found.of("clearance"),
+            others=np.stack(columns, axis=-1) if columns else np.zeros((*found.tip.shape, 0)),
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all random dimensions, those of the pins first."""
+        return (*self.linkage.clearances, *self.deviations)
+
+    @property
+    def spreads(self) -> Array:
+        """(m + k,) standard deviations of all random dimensions."""
+        return np.array([*self.clearances.deviations, *self.deviations.values()])
+
+    @property
+    def error(self) -> LinearError:
+        """The error of the tip, linear in deviations that are independent."""
+        linear = self.jacobian @ self.clearances.linear
+        return LinearError(
+            names=self.names,
+            deviations=[1.0] * len(self.linkage.pins) + list(self.deviations.values()),
+            offset=self.offset,
+            jacobian=np.concatenate([linear, self.others], axis=-1),
+            exact=None if self.clearances.shape == "normal" else self.drawn_errors,
+        )
+
+    def drawn_errors(self, z: Array) -> Array:
+        """Return (s, p, 2) errors by the linear law, of linkages that numbers (s, m + k) describe [m]."""
+        m = len(self.linkage.pins)
+        return self.errors(self.clearances.values(z[:, :m]), z[:, m:] * self.spreads[m:])
+
+    @property
+    def shares(self) -> Array:
+        """(p, m + k) part of each dimension in the variance of the error at each pose; rows add up to one.
+
+        Of correlated clearances one that balances another has a negative part.
+        """
+        own = (self.jacobian * (self.jacobian @ self.clearances.covariance)).sum(axis=1)
+        rest = ((self.others * np.array(list(self.deviations.values()))) ** 2).sum(axis=1)
+        parts = np.concatenate([own, rest], axis=-1)
+        return np.asarray(parts / np.maximum(parts.sum(axis=-1, keepdims=True), np.finfo(float).tiny))
+
+    @property
+    def across(self) -> Array:
+        """(p, 2, m) shift of the tip by the angle at which a journal lies beside its force, by its clearance."""
+        rest = find_static_equilibrium(self.linkage, self.q, np.maximum(self.clearances.mean, _LEAST))
+        ways = rest.gaps / np.linalg.norm(rest.gaps, axis=-1, keepdims=True)
+        sideways = np.stack([-ways[..., 1], ways[..., 0]], axis=-1)
+        return np.asarray(np.einsum("pami,pmi->pam", tip_sensitivity(self.linkage, rest.q), sideways))
+
+    def errors(self, clearances: Array, shifts: Array) -> Array:
+        """Return (s, p, 2) errors by the linear law [m].
+
+        Args:
+            clearances: (s, m) [m].
+            shifts: (s, k) of the other dimensions [m] or [rad].
+        """
+        steps = clearances - self.clearances.mean
+        errors = np.tensordot(steps, self.jacobian, axes=([1], [2])) + self.offset
+        return np.asarray(errors + np.tensordot(shifts, self.others, axes=([1], [2])))
+
+    def equilibria(self, z: Array, say: Callable[[str], None] | None = None) -> Array:
+        """Return (s, p, 2) errors in complete equilibrium, of linkages that numbers (s, m + k) describe [m].
+
+        Args:
+            z: standard normal numbers.
+            say: is told how many are computed.
+
+        Raises:
+            InvalidValueError: one of the linkages cannot be assembled.
+        """
+        m = len(self.linkage.pins)
+        clearances = self.clearances.values(z[:, :m])
+        if self.deviations:
+            means = dict(zip(self.linkage.clearances, self.clearances.mean.tolist(), strict=True))
+            names = [*(f"{pin}.clearance" for pin in means), *self.deviations]
+            steps = np.concatenate([clearances - self.clearances.mean, z[:, m:] * self.spreads[m:]], axis=1)
+            return sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps, say)
+        blocks = np.array_split(clearances, max(1, len(clearances) * len(self.q) // _BLOCK))
+        tips = [find_static_equilibrium(self.linkage, self.q, block[:, None]).tip for block in blocks]
+        return np.concatenate(tips) - tip_position(self.linkage, self.q)
