@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import lru_cache
 from typing import NamedTuple, TypeAlias
 
 import attrs
@@ -33,11 +33,13 @@ from armwright.errors import InvalidValueError, one_of
 
 MAX_MODES = 6
 # A body whose inertia is below that of a uniform rod has end masses below 0, as far as drawings are rounded.
-_ROUNDED = 0.02
+_ROUNDED = 0.01
 # So far from the line between the ends a point or centre may lie, by the length.
 _STRAIGHT = 1e-6
 # A mass below this part of the body's is none but for rounding.
 _NO_MASS = 1e-12
+# Rods and sections that are kept, for linkages ask for them again and again.
+_KEPT = 1024
 # Stations at which the largest deflection is looked for, nodes of integrals, and polynomials that make modes.
 _STATIONS, _FINE, _POLYNOMIALS = 41, 40, 12
 
@@ -242,7 +244,7 @@ class _Beam(NamedTuple):
     start: tuple[float, float]
 
 
-@cache
+@lru_cache(maxsize=_KEPT)
 def _make_rod(elastic: Elasticity, body: _Beam, clamped: bool) -> Rod:  # noqa: FBT001 - a key of the cache
     length, modes = body.length, elastic.modes
     beam, *ends = _split_mass(body)
@@ -289,7 +291,7 @@ def _split_mass(body: _Beam) -> tuple[float, float, float]:
     return beam, first, other
 
 
-@cache
+@lru_cache(maxsize=_KEPT)
 def _section(shapes: _Shapes, length: float, along: float) -> Section:
     at = np.array([along])
     return Section(

@@ -28,6 +28,8 @@ from armwright.files.inputs import file_path
 _Part = TypeVar("_Part")
 # The keys of which one gives the section of an elastic body; an area also needs second_moment_mm4.
 _SECTIONS = ("square_mm", "round_mm", "rectangle_mm", "tube_mm", "area_mm2")
+# Dimensions of sections [mm].
+_THINNEST, _THICKEST = 1e-3, 1e4
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
 
@@ -126,7 +128,7 @@ def _elasticity(table: Table, points: list[str]) -> Elasticity:
         ends=(ends[0], ends[1]),
         area=area,
         second_moment=second_moment,
-        young=table.number("young", default=Material().young, lower=1.0),
+        young=table.number("young", default=Material().young, lower=1.0, upper=1e15),
         modes=table.whole("modes", 1, MAX_MODES, default=3),
         damping=table.number("damping", default=0.01, lower=0.0, upper=0.99),
     )
@@ -141,21 +143,23 @@ def _section(table: Table) -> tuple[float, float]:
         what = " and ".join(given) or "none"
         raise table.error(None, f"expected one section, of {', '.join(_SECTIONS)}, got {what}")
     if given == ["area_mm2"]:
-        return table.positive("area_mm2") * 1e-6, table.positive("second_moment_mm4") * 1e-12
+        area = table.number("area_mm2", lower=_THINNEST**2, upper=_THICKEST**2)
+        second_moment = table.number("second_moment_mm4", lower=_THINNEST**4, upper=_THICKEST**4)
+        return area * 1e-6, second_moment * 1e-12
     if given == ["square_mm"]:
-        side = table.positive("square_mm") * 1e-3
+        side = table.number("square_mm", lower=_THINNEST, upper=_THICKEST) * 1e-3
         return side**2, side**4 / 12
     if given == ["round_mm"]:
-        across = table.positive("round_mm") * 1e-3
+        across = table.number("round_mm", lower=_THINNEST, upper=_THICKEST) * 1e-3
         return math.pi / 4 * across**2, math.pi / 64 * across**4
-    first, second = (float(x) * 1e-3 for x in table.vector(given[0], 2))
+    first, second = (float(x) for x in table.vector(given[0], 2))
     if given == ["rectangle_mm"]:
-        if min(first, second) <= 0:
-            raise table.error("rectangle_mm", "expected a height in the plane and a width above 0")
-        return first * second, first**3 * second / 12
-    if not 0 <= second < first:
-        raise table.error("tube_mm", "expected an outer diameter and a smaller inner one")
-    return math.pi / 4 * (first**2 - second**2), math.pi / 64 * (first**4 - second**4)
+        if not _THINNEST <= min(first, second) <= max(first, second) <= _THICKEST:
+            raise table.error("rectangle_mm", f"expected height in the plane and width, {_THINNEST:g} to {_THICKEST:g}")
+        return first * second * 1e-6, first**3 * second / 12 * 1e-12
+    if not 0 <= second <= first - _THINNEST <= _THICKEST:
+        raise table.error("tube_mm", f"expected an outer diameter to {_THICKEST:g} and a smaller inner one")
+    return math.pi / 4 * (first**2 - second**2) * 1e-6, math.pi / 64 * (first**4 - second**4) * 1e-12
 
 
 def _joint(table: Table) -> Pin | Guide:
