@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from armwright.arrays import Array
 from armwright.clearance.elastic_rod import MAX_MODES, Elasticity, Rod
 from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.ideal import close_pins
@@ -17,6 +18,7 @@ from armwright.clearance.reader import load_linkage, read_linkage
 from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.clearance.vibration.contact_modes import contact_modes
 from armwright.errors import FileFormatError, InvalidValueError, UnknownNameError
 from clearance.elastic_bodies import AREA, EI, LENGTH, MASS, YOUNG, bar, cantilever, elastic_five_bar, on_rollers
 
@@ -178,6 +180,20 @@ def test_modes_of_the_five_bar() -> None:
 
     slowest = natural_modes(linkage, rest.q).frequencies[:2]
     np.testing.assert_allclose(slowest, linkage.rods["link2"].frequencies[0], rtol=1e-3)
+
+
+def test_modes_on_contacts() -> None:
+    """On its contacts a five-bar with stiff rods vibrates as with rigid ones, and with steel rods a little slower."""
+    rigid = load_linkage("five-bar")
+    closed = close_pins(rigid, assembly_guess(rigid), tip=[FIRST_GOAL])
+
+    def slowest(linkage: Linkage) -> Array:
+        return contact_modes(linkage, closed).frequencies[0, :6]
+
+    expected = slowest(rigid)
+    np.testing.assert_allclose(slowest(elastic_five_bar(stiffer=1e6, modes=1)), expected, rtol=2e-4)
+    rolling = slowest(elastic_five_bar())[:3] / expected[:3]
+    assert np.all((rolling > 0.9) & (rolling < 1))
 
 
 def test_rigid_linkage_has_no_modes() -> None:
