@@ -264,9 +264,9 @@ class LinkageReliability:
             )
         if self.after is not None:
             strokes, found = self.after
-            rows.append(
-                (f"at any, after {_count(strokes)} strokes", f"{found.probability:.3g}", f"{found.standard_error:.1g}")
-            )
+            cells = f"{found.probability:.3g}", f"{found.standard_error:.1g}"
+            none = f"none of {found.samples} draws", ""
+            rows.append((f"at any, after {_count(strokes)} strokes", *(cells if found.probability else none)))
         if self.beyond is not None:
             full = self.beyond[0]
             error = np.sqrt(full * (1 - full) / self.samples)
