@@ -33,14 +33,14 @@ class GammaProcess(NamedTuple):
         probabilities: (m,) of each; they add up to one.
         strokes: that were measured.
         growth: over these [m] or [rad].
-        count: of increments.
+        increments: how many there were.
     """
 
     shapes: Array
     probabilities: Array
     strokes: float
     growth: float
-    count: int
+    increments: int
 
     def failure(self, growth: float, strokes: float) -> float:
         """Return the probability that the growth over strokes to come is larger than some growth.
@@ -112,5 +112,5 @@ def gamma_process(strokes: ArrayLike, growths: ArrayLike) -> GammaProcess:
         probabilities=probabilities / probabilities.sum(),
         strokes=float(n.sum()),
         growth=float(x.sum()),
-        count=len(n),
+        increments=len(n),
     )
