@@ -4,6 +4,7 @@ from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
+from armwright.cli.clearance_plan_checks import plan_checks
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_wear import wear
@@ -17,11 +18,12 @@ clearance.command("correct")(correct)
 clearance.command("wear")(wear)
 clearance.command("compare")(compare)
 clearance.command("export")(export)
+clearance.command("plan-checks")(plan_checks)
 
 
 @clearance.callback()
 def group() -> None:
-    """Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.
+    """Simulate, estimate, correct, wear, maintain and compare linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """

@@ -120,12 +120,12 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
 
 
 def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles) -> Array:
-    """Return (s, p) sliding velocities [m/s] of journals whose gaps (s, p, 2) in the ground's axes are known [m]."""
-    velocities = np.gradient(gaps, time, axis=0)
+    """Return (..., s, p) sliding velocities [m/s] of journals whose gaps (..., s, p, 2) from the ground are known [m]."""
+    velocities = np.gradient(gaps, time, axis=-3)
     slips = []
     for i, pin in enumerate(linkage.pins):
         spins = angles.journal_spin[:, i], angles.bearing_spin[:, i]
-        slips.append(_slip(pin.journal_radius, gaps[:, i], velocities[:, i], *spins))
+        slips.append(_slip(pin.journal_radius, gaps[..., i, :], velocities[..., i, :], *spins))
     return np.stack(slips, axis=-1)
 
 
@@ -136,7 +136,7 @@ def rotate(vectors: Array, angles: Array) -> Array:
 
 
 def _slip(radius: float, gap: Array, velocity: Array, journal_spin: Array, bearing_spin: Array) -> Array:
-    """Return (s,) the velocity of the surface of a journal of this radius along the wall that it touches."""
+    """Return (..., s) the velocity of the surface of a journal of this radius along the wall that it touches."""
     distance = np.linalg.norm(gap, axis=-1)
-    along = np.stack([-gap[:, 1], gap[:, 0]], axis=-1) / distance[:, None]
+    along = np.stack([-gap[..., 1], gap[..., 0]], axis=-1) / distance[..., None]
     return np.asarray((velocity * along).sum(axis=-1) + journal_spin * radius - bearing_spin * (radius + distance))
