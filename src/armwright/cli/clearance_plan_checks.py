@@ -43,6 +43,9 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
         list[str] | None, Option(help="Factor of the wear coefficient of a pin, as in J3=2; may be repeated.")
     ] = None,
     grain_um: Annotated[float, Option(help="Variance of a growth divided by its mean, in um.")] = 0.5,
+    scatter: Annotated[
+        float, Option(help="Standard deviation of the growth between two checks, as a part of it.")
+    ] = 0.05,
     clearance: Annotated[
         list[str] | None, Option(help="Radial clearance of a new pin in mm, as in J2=0.1; may be repeated.")
     ] = None,
@@ -103,7 +106,14 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     if measurements is not None:
         warn_of_stray(measurements)
         checks = read_checks(measurements, model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
-    prior = _prior(model, k, pin_factor or [])
+    prior = attrs.evolve(
+        _prior(model, k, pin_factor or []),
+        clearance_spread=clearance_spread_um * 1e-6,
+        spread=k_spread,
+        pin_spread=pin_spread,
+        grain=grain_um * 1e-6,
+        scatter=scatter,
+    )
     changes = named_numbers(changed or [], ("",), "a pin and strokes, J2=2e6", "--changed")
     strategy = Strategy(
         limit=limit_mm * 1e-3,
@@ -115,17 +125,12 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
         readings=readings,
     )
     law = WearLaw(coefficient=1.0, width=width_mm * 1e-3, bearing_share=bearing_share)
-    machine = wearing_linkage(model, path_of(model, path, speed_rpm, 1.0), law, poses=poses)
+    stroke = path_of(model, path, speed_rpm, 1.0)
+    machine = wearing_linkage(model, stroke, law, exposure=horizon * prior.fastest, poses=poses)
     with counting("lives", quiet=quiet or as_json) as progress:
         plan = planned(
             machine,
-            attrs.evolve(
-                prior,
-                clearance_spread=clearance_spread_um * 1e-6,
-                spread=k_spread,
-                pin_spread=pin_spread,
-                grain=grain_um * 1e-6,
-            ),
+            prior,
             strategy,
             checks=checks,
             changed={pin: number.value for pin, number in changes.items()},

@@ -16,14 +16,12 @@ from armwright.arrays import Array, finite_or_none, integer, not_negative
 from armwright.clearance.estimation.misfit import CONTRADICTION, p_value
 from armwright.clearance.maintenance.belief import Belief, WearPrior
 from armwright.clearance.maintenance.check_file import PastCheck
-from armwright.clearance.maintenance.simulated_lives import SimulatedLife, simulate_lives
+from armwright.clearance.maintenance.comparison import Maintained, compare_ways, standard_error
 from armwright.clearance.maintenance.strategy import NextStop, Planner, Strategy
 from armwright.clearance.maintenance.wearing_linkage import WearingLinkage
-from armwright.errors import ContradictionError, InvalidValueError, one_of
+from armwright.errors import ContradictionError, InvalidValueError, counted, one_of
 from armwright.files.result_table import ResultTable
 
-# Checks in a horizon with which the plan is compared, fewest first.
-FIXED_CHECKS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 # Corrections that are printed; the others are in the files.
 _SHOWN = 12
 _LEVEL = 0.9
@@ -52,54 +50,6 @@ class Known(NamedTuple):
             np.stack([c_low, belief.clearances.mean(axis=0), c_high]),
             np.stack([k_low, middle, k_high]),
         )
-
-
-@attrs.frozen(kw_only=True, eq=False)
-class Maintained:
-    """What simulated lives from now on came to, maintained in one way.
-
-    Attributes:
-        checks: in the horizon at equal distances; None for the plan.
-        lives: simulated.
-        strokes: of each.
-    """
-
-    checks: int | None
-    lives: Sequence[SimulatedLife]
-    strokes: float
-
-    @property
-    def stops(self) -> Array:
-        """(l,) number of stops of each life."""
-        return np.array([float(len(life.stops)) for life in self.lives])
-
-    @property
-    def outside(self) -> Array:
-        """(l,) share of strokes out of limit of each life."""
-        return np.array([life.outside / self.strokes for life in self.lives])
-
-    @property
-    def changes(self) -> Array:
-        """(l,) number of changed bearings of each life."""
-        return np.array([float(sum(len(stop.changed) for stop in life.stops)) for life in self.lives])
-
-    @property
-    def covered(self) -> float | None:
-        """Share of the intervals of wear coefficients that hold the true ones; None where nothing was measured."""
-        held = [one for life in self.lives for one in life.covered]
-        return float(np.mean(held)) if held else None
-
-    def as_data(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return {
-            "checks": self.checks,
-            "interval": None if self.checks is None else self.strokes / (self.checks + 1),
-            **{
-                name: {"mean": float(values.mean()), "standard_error": _standard_error(values)}
-                for name, values in (("stops", self.stops), ("changes", self.changes), ("outside", self.outside))
-            },
-            "covered": self.covered,
-        }
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -223,10 +173,9 @@ class CheckPlan:
         notes = [when]
         if self.due:
             notes.append(f"change now: {', '.join(self.due)}; a correction of the path helps no longer")
-        stops = self.planned.stops
+        stops, until = self.planned.stops, f"until {strategy.horizon:.4g} strokes, of {len(self.planned.lives)} lives"
         notes += [
-            f"expected stops until {strategy.horizon:.4g} strokes: {stops.mean():.3g} ± {_standard_error(stops):.2g} "
-            f"(mean of {len(stops)} simulated lives, ± its standard error)",
+            f"expected stops: {stops.mean():.3g} ± {standard_error(stops):.2g} {until}",
             "correct the path for the clearances of the table: armwright clearance correct --clearance PIN=MM",
             "errors are those of journals that lie at their walls, anywhere in their friction cones, without impacts",
         ]
@@ -236,9 +185,13 @@ class CheckPlan:
             )
         same = self.equally_safe()
         if same is None:
-            notes.append(f"none of the fixed intervals with up to {self.fixed[-1].checks} checks is as safe as the plan")
+            notes.append(
+                f"none of the fixed intervals with up to {self.fixed[-1].checks} checks is as safe as the plan"
+            )
         else:
-            notes.append(f"as safe at equal distances: {same.checks} checks, {same.stops.mean():.3g} stops")
+            notes.append(
+                f"as safe at equal distances: {counted(same.checks or 0, 'check')}, {same.stops.mean():.3g} stops"
+            )
         return notes
 
     def tables(self) -> Iterator[ResultTable]:
@@ -264,7 +217,12 @@ class CheckPlan:
         units = [("mm", 1e3) if kind == "slide" else ("deg", 180 / np.pi) for kind in self._drive_kinds()]
         yield ResultTable(
             title="Poses of a check",
-            heads=("pose", "tip x mm", "y mm", *(f"{name} {unit}" for name, (unit, _) in zip(drives, units, strict=True))),
+            heads=(
+                "pose",
+                "tip x mm",
+                "y mm",
+                *(f"{name} {unit}" for name, (unit, _) in zip(drives, units, strict=True)),
+            ),
             rows=[
                 (
                     str(k + 1),
@@ -291,10 +249,10 @@ class CheckPlan:
                     "plan" if one.checks is None else str(one.checks),
                     "" if one.checks is None else f"{one.strokes / (one.checks + 1):.3g}",
                     f"{one.stops.mean():.2f}",
-                    f"{_standard_error(one.stops):.2f}",
+                    f"{standard_error(one.stops):.2f}",
                     f"{one.changes.mean():.2f}",
                     f"{one.outside.mean() * 100:.3f}",
-                    f"{_standard_error(one.outside) * 100:.3f}",
+                    f"{standard_error(one.outside) * 100:.3f}",
                 )
                 for one in (self.planned, *self.fixed)
             ],
@@ -346,26 +304,11 @@ def plan_checks(
         InvalidValueError: a number is out of its range.
         ContradictionError: a check contradicts what was believed.
     """
-    rng = np.random.default_rng([seed, 0])
-    names = tuple(machine.linkage.clearances)
-    for pin, moment in (changed or {}).items():
-        one_of("pin", pin, names)
-        not_negative(moment, f"change of {pin}", "strokes")
     integer(lives, "simulated lives", least=2)
+    rng = np.random.default_rng([seed, 0])
     planner = Planner.of(machine, strategy, samples, seed)
-    belief = Belief.new(prior, machine.table, rng, samples)
-    history = [Known.of(belief)]
-    events: list[tuple[float, PastCheck | str]] = [(check.strokes, check) for check in checks]
-    events += [(moment, pin) for pin, moment in (changed or {}).items()]
-    for moment, event in sorted(events, key=lambda pair: (pair[0], isinstance(pair[1], str))):
-        before = belief.at(moment, rng)
-        if isinstance(event, str):
-            belief = before.with_new_bearing(names.index(event), rng)
-        else:
-            measured = event.measured(machine, strategy.noise, before.clearances.mean(axis=0))
-            belief = belief.updated(moment, measured, rng)
-            _refuse_surprise(belief, len(measured.values))
-        history.append(Known.of(belief))
+    history = learn(planner, Belief.new(prior, machine.table, rng, samples), checks, changed or {}, rng)
+    belief = history[-1]
     now = belief.strokes if strokes is None else strokes
     if not belief.strokes <= not_negative(now, "strokes done") < strategy.horizon:
         raise InvalidValueError(
@@ -373,41 +316,59 @@ def plan_checks(
             f"got {now:g}"
         )
     if now > belief.strokes:
-        belief = belief.at(now, rng)
-        history.append(Known.of(belief))
-    fresh, due, stop = planner.changes(belief, rng)
-    total, done = 100 * (1 + len(FIXED_CHECKS)), 0
-
-    def maintained(number: int | None) -> Maintained:
-        nonlocal done
-        left = strategy.horizon - now
-
-        def advance(part: float, begun: int = done) -> None:
-            if progress is not None:
-                progress(min(begun + round(100 * part), total), total)
-
-        interval = None if number is None else left / (number + 1)
-        simulated = simulate_lives(planner, belief, lives, seed=seed, interval=interval, progress=advance)
-        done += 100
-        return Maintained(checks=number, lives=simulated, strokes=left)
-
-    planned = maintained(None)
-    fixed = []
-    for number in FIXED_CHECKS:
-        fixed.append(maintained(number))
-        if fixed[-1].outside.mean() <= planned.outside.mean():
-            break
+        history.append(belief.at(now, rng))
+    fresh, due, stop = planner.changes(history[-1], rng)
+    planned, *fixed = compare_ways(planner, history[-1], lives, seed, progress)
     return CheckPlan(
         planner=planner,
-        history=history,
+        history=[Known.of(known) for known in history],
         changed=changed or {},
         belief=fresh,
-        due=[names[pin] for pin in due],
+        due=[list(machine.linkage.clearances)[pin] for pin in due],
         next_stop=stop,
         planned=planned,
         fixed=fixed,
         strokes_per_day=strokes_per_day,
     )
+
+
+def learn(
+    planner: Planner,
+    new: Belief,
+    checks: Sequence[PastCheck],
+    changed: Mapping[str, float],
+    rng: np.random.Generator,
+) -> list[Belief]:
+    """Return what was known of new pins, and after each check and each change of a bearing.
+
+    Args:
+        planner: with the linkage and the noise of readings.
+        new: what is known of new pins.
+        checks: that were made.
+        changed: strokes at which bearings were changed, by pin; after a check at the same strokes.
+        rng: for the samples.
+
+    Raises:
+        UnknownNameError: there is no such pin.
+        InvalidValueError: strokes are negative.
+        ContradictionError: a check contradicts what was believed.
+    """
+    machine = planner.machine
+    names = list(machine.linkage.clearances)
+    events: list[tuple[float, PastCheck | str]] = [(check.strokes, check) for check in checks]
+    for pin, moment in changed.items():
+        one_of("pin", pin, names)
+        events.append((not_negative(moment, f"change of {pin}", "strokes"), pin))
+    history = [new]
+    for moment, event in sorted(events, key=lambda pair: (pair[0], isinstance(pair[1], str))):
+        before = history[-1].at(moment, rng)
+        if isinstance(event, str):
+            history.append(before.with_new_bearing(names.index(event), rng))
+        else:
+            measured = event.measured(machine, planner.strategy.noise, before.clearances.mean(axis=0))
+            history.append(history[-1].updated(moment, measured, rng))
+            _refuse_surprise(history[-1], len(measured.values))
+    return history
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
@@ -422,7 +383,3 @@ def _refuse_surprise(belief: Belief, values: int) -> None:
             f"p = {p:.2g}); check its units and poses, whether a bearing was changed (--changed), the noise of the "
             f"readings (--noise-um), and the spread of the wear coefficients (--k-spread)"
         )
-
-
-def _standard_error(values: Array) -> float:
-    return float(values.std(ddof=1) / np.sqrt(len(values)))

@@ -27,6 +27,8 @@ _TAILS = 6.0
 _FEWEST, _MOST = 100, 100_000
 # A logarithm within which no wear coefficient is bounded by rounding.
 _WIDEST = 5.0
+# A normal deviate of which nineteen in twenty are not larger.
+_DEVIATE = 1.6448536269514722
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -40,6 +42,7 @@ class WearPrior:
         spread: standard deviation of the logarithm that all pins have in common.
         pin_spread: standard deviation of the logarithm of a single bearing about that of all.
         grain: of wear: the variance of a growth divided by its mean [m].
+        scatter: standard deviation of a growth between two checks, as a part of its mean: how well its law is known.
     """
 
     clearances: Array
@@ -48,6 +51,7 @@ class WearPrior:
     spread: float
     pin_spread: float
     grain: float
+    scatter: float = 0.05
 
     def __attrs_post_init__(self) -> None:
         """Check the ranges."""
@@ -62,9 +66,17 @@ class WearPrior:
             positive(float(coefficient), "wear coefficient")
         not_negative(self.clearance_spread, "spread of the clearances")
         not_negative(self.grain, "grain of the wear")
+        not_negative(self.scatter, "scatter of the wear")
         for name, spread in (("spread", self.spread), ("pin spread", self.pin_spread)):
             if not_negative(spread, f"{name} of the wear coefficients") > _WIDEST:
-                raise InvalidValueError(f"{name} of the wear coefficients: expected at most {_WIDEST:g}, got {spread:g}")
+                raise InvalidValueError(
+                    f"{name} of the wear coefficients: expected at most {_WIDEST:g}, got {spread:g}"
+                )
+
+    @property
+    def fastest(self) -> float:
+        """The largest wear coefficient that has to be expected: nineteen in twenty are smaller [m²/N]."""
+        return float(self.coefficients.max() * np.exp(_DEVIATE * np.hypot(self.spread, self.pin_spread)))
 
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Return (count, p) clearances [m] and logarithms of wear coefficients."""
@@ -73,6 +85,10 @@ class WearPrior:
         logs = logs + self.pin_spread * rng.standard_normal(shape)
         clearances = self.clearances + self.clearance_spread * rng.standard_normal(shape)
         return np.maximum(clearances, _LEAST_CLEARANCE), logs
+
+    def growth_deviation(self, growth: Array) -> Array:
+        """Return the standard deviations of growths of the same shape [m]."""
+        return np.sqrt(self.grain * growth + (self.scatter * growth) ** 2)
 
     def new_bearing(self, pin: int, logs: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return (s,) clearances [m] and logarithms of a new bearing, beside pins with logarithms (s, p).
@@ -143,7 +159,7 @@ class Belief:
         """
         exposure = (strokes[:, None, None] - self.strokes) * np.exp(self.logs)
         mean = self.table.grown(self.clearances, exposure)
-        return np.maximum(mean + np.sqrt(self.prior.grain * (mean - self.clearances)) * noise, _LEAST_CLEARANCE)
+        return np.maximum(mean + self.prior.growth_deviation(mean - self.clearances) * noise, _LEAST_CLEARANCE)
 
     def at(self, strokes: float, rng: np.random.Generator) -> Belief:
         """Return what is known after more strokes, without a measurement."""
@@ -178,7 +194,7 @@ class Belief:
             before = mean + u[..., :size] @ factor.T
             c, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., p:]
             grown = self.table.grown(c, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
-            return grown + np.sqrt(self.prior.grain * (grown - c)) * u[..., size:], logs
+            return grown + self.prior.growth_deviation(grown - c) * u[..., size:], logs
 
         def residuals(u: Array) -> Array:
             misfit = measured.values - states(u)[0] @ measured.design.T
@@ -196,7 +212,9 @@ class Belief:
         u = u[_systematic_sample(weights, rng)]
         clearances, logs = states(u)
         clearances = np.maximum(clearances, _LEAST_CLEARANCE)
-        return attrs.evolve(self, strokes=strokes, clearances=clearances, logs=logs, misfit=float(found.fun @ found.fun))
+        return attrs.evolve(
+            self, strokes=strokes, clearances=clearances, logs=logs, misfit=float(found.fun @ found.fun)
+        )
 
     def with_new_bearing(self, pin: int, rng: np.random.Generator) -> Belief:
         """Return what is known after a bearing was changed."""

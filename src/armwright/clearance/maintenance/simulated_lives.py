@@ -209,7 +209,10 @@ class _Population:
         self._rates[rows] = last
         part, slope = (moments / end)[..., None], (last - first)[:, None]
         mean = np.diff(moments[..., None] * k[:, None] * (first[:, None] + slope * part / 2), axis=1, prepend=0.0)
-        grain = self._prior.grain
+        grain, scatter = self._prior.grain, self._prior.scatter
+        if scatter > 0:
+            # Of the whole interval, with a mean of one.
+            mean *= self._rng.gamma(scatter**-2, scatter**2, (len(rows), 1, mean.shape[-1]))
         grown = self._rng.gamma(mean / grain, grain) if grain > 0 else mean
         history = now[:, None] + grown.cumsum(axis=1)
         self.clearances[rows] = history[:, -1]

@@ -181,11 +181,13 @@ class Planner:
             due = now
         elif len(over):
             between = np.linspace(times[over[0] - 1], times[over[0]], _FINE + 2)
-            finer = np.concatenate([
-                [probabilities[over[0] - 1]],
-                self.probabilities(belief, corrections, between[1:-1]),
-                [probabilities[over[0]]],
-            ])
+            finer = np.concatenate(
+                [
+                    [probabilities[over[0] - 1]],
+                    self.probabilities(belief, corrections, between[1:-1]),
+                    [probabilities[over[0]]],
+                ]
+            )
             k = int(np.flatnonzero(finer >= strategy.alpha)[0])
             part = (strategy.alpha - finer[k - 1]) / (finer[k] - finer[k - 1])
             due = float(between[k - 1] + part * (between[k] - between[k - 1]))

@@ -31,6 +31,8 @@ from armwright.errors import InvalidValueError
 _MOMENTS, _WATCHED = 81, 9
 # Clearances at which the growth is tabulated, and bins whose depth is less than this part of the deepest are not worn.
 _LEVELS, _WORN = 6, 1e-3
+# Growth beyond this part of the radius of a journal is not tabulated.
+_BROKEN = 0.5
 # Candidates for the poses of a check along each axis, in the box round the path, which is at least so wide [m].
 _CANDIDATES, _LEAST_BOX = 6, 0.2
 # Of a drive, for the derivative of the tip [rad, m].
@@ -162,7 +164,7 @@ class WearingLinkage:
 
 
 def wearing_linkage(
-    linkage: Linkage, path: Path, law: WearLaw | None = None, *, poses: int = 3, range_of_growth: float = 1e-3
+    linkage: Linkage, path: Path, law: WearLaw | None = None, *, exposure: float, poses: int = 3
 ) -> WearingLinkage:
     """Prepare a linkage for the plan of its checks.
 
@@ -170,8 +172,8 @@ def wearing_linkage(
         linkage: with the clearances of new pins.
         path: of a stroke.
         law: of the wear; its coefficient does not count.
+        exposure: product of strokes and wear coefficient until which growth is tabulated [m²/N].
         poses: at which a check holds the arm.
-        range_of_growth: of the most worn pin, over which growth is tabulated [m].
 
     Raises:
         InvalidValueError: the path cannot be followed, a pin does not wear, or no poses are left.
@@ -186,7 +188,7 @@ def wearing_linkage(
     unit = attrs.evolve(law or WearLaw(coefficient=1.0), coefficient=1.0)
     stroke = Stroke.of(linkage, path, _MOMENTS)
     watched, left_out = _watched(linkage, path, stroke)
-    table, depth_by_work = _tabulate(stroke, unit, c, positive(range_of_growth, "range of growth", "m"))
+    table, depth_by_work = _tabulate(stroke, unit, c, positive(exposure, "exposure", "m²/N"))
     by_drives = _tip_by_drives(linkage, watched.q)
     inverse = np.linalg.pinv(by_drives, rcond=1e-6)
     return WearingLinkage(
@@ -207,12 +209,16 @@ def wearing_linkage(
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _tabulate(stroke: Stroke, law: WearLaw, clearances: Array, range_of_growth: float) -> tuple[GrowthTable, Array]:
+def _tabulate(stroke: Stroke, law: WearLaw, clearances: Array, exposure: float) -> tuple[GrowthTable, Array]:
     """Return growth along the life that equal wear coefficients lead to, and (p,) the depth by work half way."""
     first = _growth(stroke, law, clearances)
     if not np.all(first.rates > 0):
         raise InvalidValueError(f"{stroke.linkage.name}: nothing slides in its pins on path {stroke.name}")
-    levels = clearances + np.linspace(0.0, 1.0, _LEVELS)[:, None] * range_of_growth * first.rates / first.rates.max()
+    radii = np.array([pin.journal_radius for pin in stroke.linkage.pins])
+    far = exposure * first.rates
+    # Worn-through pins are beyond any plan.
+    far *= min(1.0, float((_BROKEN * radii / far).min()))
+    levels = clearances + np.linspace(0.0, 1.0, _LEVELS)[:, None] * far
     growths = [first, *(_growth(stroke, law, level) for level in levels[1:])]
     middle = growths[_LEVELS // 2]
     return GrowthTable.of(levels, np.array([growth.rates for growth in growths])), middle.rates / middle.work
@@ -224,7 +230,7 @@ class _Growth(NamedTuple):
 
 
 def _growth(stroke: Stroke, law: WearLaw, clearances: Array) -> _Growth:
-    """Return (p,) the growth of clearances (p,) by stroke, the mean depth of what is worn on both surfaces; and F ds."""
+    """Return (p,) the mean depth of what a stroke wears on both surfaces, for clearances (p,), and (p,) its F ds."""
     linkage = stroke.linkage.with_clearances(dict(zip(stroke.linkage.clearances, clearances, strict=True)))
     leaning = lean(attrs.evolve(stroke, linkage=linkage), law, WornSurfaces.new(len(linkage.pins), law.bins))
     growth = leaning_growth(law, linkage, leaning)
@@ -238,9 +244,11 @@ def _growth(stroke: Stroke, law: WearLaw, clearances: Array) -> _Growth:
 def _watched(linkage: Linkage, path: Path, stroke: Stroke) -> tuple[Places, int]:
     """Return moments of the motion, and the goals at rest; and how many moments were left out."""
     rows = np.linspace(0, len(stroke.time) - 1, _WATCHED + 2).astype(int)[1:-1]
-    loose = [interval for intervals in predict_contact_loss(linkage, path).values() for interval in intervals] if (
-        path.follower == "tip"
-    ) else []
+    loose = (
+        [interval for intervals in predict_contact_loss(linkage, path).values() for interval in intervals]
+        if (path.follower == "tip")
+        else []
+    )
     gap = stroke.time[1] - stroke.time[0]
     kept = [k for k in rows if not any(begin - gap <= stroke.time[k] <= end + gap for begin, end in loose)]
     still = np.zeros_like(stroke.rest)

@@ -120,7 +120,7 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
 
 
 def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles) -> Array:
-    """Return (..., s, p) sliding velocities [m/s] of journals whose gaps (..., s, p, 2) from the ground are known [m]."""
+    """Return (..., s, p) sliding velocities [m/s] of journals with gaps (..., s, p, 2) in the ground's axes [m]."""
     velocities = np.gradient(gaps, time, axis=-3)
     slips = []
     for i, pin in enumerate(linkage.pins):
