@@ -92,7 +92,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     import attrs
 
     from armwright.clearance.maintenance.assessment import plan_checks as planned
-    from armwright.clearance.maintenance.check_file import read_checks
+    from armwright.clearance.maintenance.check_file import PastCheck, read_checks
     from armwright.clearance.maintenance.strategy import Strategy
     from armwright.clearance.maintenance.wearing_linkage import wearing_linkage
     from armwright.clearance.reader import load_linkage
@@ -102,7 +102,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     if strokes_per_day is not None and not 0 < strokes_per_day < float("inf"):
         raise usage_error("--strokes-per-day", f"expected a number above 0, got {strokes_per_day:g}")
     model = with_clearances(load_linkage(linkage), clearance or [])
-    checks = ()
+    checks: tuple[PastCheck, ...] = ()
     if measurements is not None:
         warn_of_stray(measurements)
         checks = read_checks(measurements, model, columns=columns_of(columns), skip_incomplete=skip_incomplete)

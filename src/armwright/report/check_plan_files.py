@@ -48,14 +48,14 @@ def _tiles(plan: CheckPlan) -> Iterator[Tile]:
     yield Tile(f"{due:.3g}" if np.isfinite(due) else "none", "strokes at which the next check is due")
     yield Tile(f"{plan.planned.stops.mean():.2g}", "stops expected")
     same = plan.equally_safe()
-    if same is not None:
+    if same is not None and plan.planned.outside.any():
         yield Tile(f"{same.stops.mean():.2g}", "stops at equal distances, as safe")
     yield Tile(f"{plan.planned.outside.mean():.2%}", "of strokes out of limit")
 
 
 def _timeline(plan: CheckPlan) -> Drawing:
     """Draw what was done, and what is planned; after the next check as in a life with the median number of stops."""
-    figure = empty_figure((7.4, 2.6))
+    figure = empty_figure((7.4, 3.0))
     axes = plain_axes(figure, "strokes", "")
     lives = sorted(plan.planned.lives, key=lambda life: len(life.stops))
     typical = lives[len(lives) // 2]
@@ -81,7 +81,7 @@ def _timeline(plan: CheckPlan) -> Drawing:
 
 
 def _clearances(plan: CheckPlan) -> Drawing:
-    figure = empty_figure((7.4, 4.4))
+    figure = empty_figure((7.4, 4.0))
     axes = plain_axes(figure, "strokes", "clearance, mm")
     times, bands = plan.forecast()
     for i, pin in enumerate(plan.pins):
@@ -90,7 +90,9 @@ def _clearances(plan: CheckPlan) -> Drawing:
         axes.fill_between(times, low, high, color=f"C{i}", alpha=0.15)
         strokes = np.array([known.strokes for known in plan.history])
         below, mean, above = np.array([known.clearances[:, i] for known in plan.history]).T * 1e3
-        axes.errorbar(strokes, mean, (mean - below, above - mean), fmt="o", color=f"C{i}", markersize=4, capsize=2)
+        axes.errorbar(
+            strokes, mean, (mean - below, above - mean), fmt="o:", linewidth=1, color=f"C{i}", markersize=4, capsize=2
+        )
     if np.isfinite(plan.next_stop.strokes):
         axes.axvline(plan.next_stop.strokes, color="C3", linestyle=":", linewidth=1, label="next check")
     axes.set_xlim(0, plan.planner.strategy.horizon)
@@ -107,6 +109,6 @@ def _stops(plan: CheckPlan) -> Drawing:
     axes.plot(*zip(*fixed, strict=True), "C7o-", label="checks at equal distances")
     axes.plot([plan.planned.stops.mean()], [plan.planned.outside.mean() * 100], "C3D", label="plan")
     axes.axhline(plan.planner.strategy.alpha * 100, color="C3", linestyle=":", linewidth=1, label="alpha")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(bottom=-0.05 * axes.get_ylim()[1])
     axes.legend(fontsize="small")
     return Drawing("stops", "Stops and strokes out of limit: the plan, and checks at equal distances", svg_text(figure))

@@ -184,7 +184,9 @@ class CheckPlan:
                 f"{self.machine.left_out} moments of the path do not count, since journals may leave their walls there"
             )
         same = self.equally_safe()
-        if same is None:
+        if not self.planned.outside.any():
+            notes.append("no simulated stroke was out of limit; more lives (--simulate) compare the ways better")
+        elif same is None:
             notes.append(
                 f"none of the fixed intervals with up to {self.fixed[-1].checks} checks is as safe as the plan"
             )
@@ -205,7 +207,7 @@ class CheckPlan:
                 (
                     pin,
                     *(f"{x * 1e3:.4f}" for x in now.clearances[[1, 0, 2], i]),
-                    *(f"{x * 1e9:.3g}" for x in now.coefficients[[1, 0, 2], i]),
+                    *(f"{x * 1e9:.2e}" for x in now.coefficients[[1, 0, 2], i]),
                     f"{changes[pin][0]:.0%}",
                     f"{np.median(changes[pin][1]):.3g}" if len(changes[pin][1]) else "",
                 )

@@ -245,4 +245,4 @@ def _systematic_sample(weights: Array, rng: np.random.Generator) -> Numbers:
     """Return as many numbers of samples as there are weights, each as often as its weight asks for."""
     total = np.cumsum(weights)
     places = (np.arange(len(weights)) + rng.random()) * (total[-1] / len(weights))
-    return np.minimum(np.searchsorted(total, places), len(weights) - 1)
+    return np.asarray(np.minimum(np.searchsorted(total, places), len(weights) - 1))

@@ -77,23 +77,27 @@ def compare_ways(
         seed: of all random numbers; all ways meet the same linkages.
         progress: called with the number of simulated hundredths, and of all.
     """
-    left = planner.strategy.horizon - belief.strokes
-    total = 100 * (1 + len(FIXED_CHECKS))
-    safe = -np.inf
-    for turn, number in enumerate((None, *FIXED_CHECKS)):
+    left, total = planner.strategy.horizon - belief.strokes, 100 * (1 + len(FIXED_CHECKS))
 
-        def advance(part: float, begun: int = 100 * turn) -> None:
+    def maintained(number: int | None, turn: int) -> Maintained:
+        def advance(part: float) -> None:
             if progress is not None:
-                progress(begun + round(100 * part), total)
+                progress(100 * turn + round(100 * part), total)
 
         interval = None if number is None else left / (number + 1)
         lives = simulate_lives(planner, belief, count, seed=seed, interval=interval, progress=advance)
-        done = Maintained(checks=number, lives=lives, strokes=left)
-        yield done
-        if number is None:
-            safe = float(done.outside.mean())
-        elif done.outside.mean() <= safe:
-            return
+        return Maintained(checks=number, lives=lives, strokes=left)
+
+    plan = maintained(None, 0)
+    yield plan
+    # Far fewer checks than those of the plan are not as safe, wherever they are.
+    fewest = max(0.0, np.floor(plan.stops.mean() - plan.changes.mean() - 1))
+    for turn, number in enumerate(FIXED_CHECKS, 1):
+        if number >= fewest:
+            fixed = maintained(number, turn)
+            yield fixed
+            if fixed.outside.mean() <= plan.outside.mean():
+                return
 
 
 def standard_error(values: Array) -> float:

@@ -90,7 +90,8 @@ def simulate_lives(
         start: what is known.
         count: of the lives.
         seed: of all random numbers; lives of one seed begin alike, whatever their stops.
-        interval: strokes between checks; those of the planner when left out.
+        interval: strokes between checks, beside those at which a bearing is to be changed; those of the planner when
+            left out.
         progress: called with the part of all strokes that is done.
 
     Raises:
@@ -108,7 +109,10 @@ def simulate_lives(
     rows = np.arange(count)
     while len(rows):
         active = [lives[row] for row in rows]
-        due = [life.next_stop.strokes if interval is None else life.now + interval for life in active]
+        due = [
+            life.next_stop.strokes if interval is None else min(life.now + interval, life.next_stop.change)
+            for life in active
+        ]
         # Two stops at one moment are one.
         soonest = np.array([life.now for life in active]) + strategy.least_interval / 10
         ends = np.minimum(np.maximum(due, soonest), strategy.horizon)
@@ -214,7 +218,7 @@ class _Population:
             # Of the whole interval, with a mean of one.
             mean *= self._rng.gamma(scatter**-2, scatter**2, (len(rows), 1, mean.shape[-1]))
         grown = self._rng.gamma(mean / grain, grain) if grain > 0 else mean
-        history = now[:, None] + grown.cumsum(axis=1)
+        history: Array = now[:, None] + grown.cumsum(axis=1)
         self.clearances[rows] = history[:, -1]
         return history
 

@@ -98,12 +98,14 @@ class NextStop:
 
     Attributes:
         strokes: at which the next check is due; infinite where none is within the horizon.
+        change: strokes at which the first mean clearance reaches that of a change; infinite likewise.
         corrections: until then, and after.
         times: (n,) strokes at which the probability was computed.
         probabilities: (n,) of an error beyond the limit there.
     """
 
     strokes: float
+    change: float
     corrections: Corrections
     times: Array
     probabilities: Array
@@ -150,11 +152,9 @@ class Planner:
         # Where the drift stands still its inverse has no value; the last of equal ones is taken.
         rising = np.append(True, np.diff(drift) > 0)
 
-        def after(drifts: Array) -> Array:
-            return np.interp(drifts, drift[rising], times[rising])
-
-        starts = after(step * np.arange(count))
-        middles = after(step * (np.arange(count) + 0.5))
+        starts, middles = (
+            np.interp(step * (np.arange(count) + part), drift[rising], times[rising]) for part in (0.0, 0.5)
+        )
         clearances = np.stack([np.interp(middles, times, column) for column in means.T], axis=-1)
         return Corrections(starts, clearances)
 
@@ -172,7 +172,13 @@ class Planner:
         corrections = self.corrections(belief)
         least = strategy.least_interval / 10
         if now + least >= strategy.horizon:
-            return NextStop(strokes=np.inf, corrections=corrections, times=np.array([now]), probabilities=np.zeros(1))
+            return NextStop(
+                strokes=np.inf,
+                change=np.inf,
+                corrections=corrections,
+                times=np.array([now]),
+                probabilities=np.zeros(1),
+            )
         times = now + np.append(0.0, np.geomspace(least, strategy.horizon - now, _COARSE))
         probabilities = self.probabilities(belief, corrections, times)
         over = np.flatnonzero(probabilities >= strategy.alpha)
@@ -194,9 +200,11 @@ class Planner:
             times = np.append(times, between[1:-1])
             probabilities = np.append(probabilities, finer[1:-1])
         order = np.argsort(times)
-        due = min(due, self._change_due(belief))
+        change = self._change_due(belief)
+        due = min(due, change)
         return NextStop(
             strokes=due if due < strategy.horizon else np.inf,
+            change=change,
             corrections=corrections,
             times=times[order],
             probabilities=probabilities[order],
@@ -207,9 +215,9 @@ class Planner:
         strategy, changed = self.strategy, []
         enough = min(belief.strokes + strategy.least_interval, strategy.horizon)
         beyond = self._means_at(belief, belief.strokes + strategy.least_interval) > strategy.change_at
-        for pin in np.flatnonzero(beyond):
-            belief = belief.with_new_bearing(int(pin), rng)
-            changed.append(int(pin))
+        for pin in np.flatnonzero(beyond).tolist():
+            belief = belief.with_new_bearing(pin, rng)
+            changed.append(pin)
         stop = self.next_stop(belief)
         while min(stop.strokes, strategy.horizon) < enough:
             tried = {}

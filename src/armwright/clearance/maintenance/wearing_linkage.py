@@ -120,7 +120,7 @@ class GrowthTable:
             now = np.interp(c[..., i], self.clearances[:, i], self.exposures[:, i])
             grown[..., i] = np.interp(now + x[..., i], self.exposures[:, i], self.clearances[:, i])
         # Rounding does not let a clearance shrink.
-        return np.maximum(grown, c)
+        return np.asarray(np.maximum(grown, c))
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -190,7 +190,7 @@ def wearing_linkage(
     watched, left_out = _watched(linkage, path, stroke)
     table, depth_by_work = _tabulate(stroke, unit, c, positive(exposure, "exposure", "m²/N"))
     by_drives = _tip_by_drives(linkage, watched.q)
-    inverse = np.linalg.pinv(by_drives, rcond=1e-6)
+    inverse: Array = np.linalg.pinv(by_drives, rcond=1e-6).astype(np.float64)
     return WearingLinkage(
         linkage=linkage,
         law=unit,
@@ -282,19 +282,19 @@ def _telling_poses(linkage: Linkage, stroke: Stroke, count: int) -> Places:
 def _candidates(linkage: Linkage, stroke: Stroke) -> Places:
     """Return regular poses at rest: of a grid in the box round the path, or along the path of a single drive."""
     if len(linkage.drives) != 2:
-        guesses = stroke.motion.q[np.linspace(0, len(stroke.time) - 1, _CANDIDATES**2).astype(int)]
-        goals: list[Array | None] = [None] * len(guesses)
+        guesses = list(stroke.motion.q[np.linspace(0, len(stroke.time) - 1, _CANDIDATES**2).astype(int)])
+        goals: list[dict[str, Array]] = [{"drives": q[list(linkage.driven)]} for q in guesses]
     else:
         tip = tip_position(linkage, stroke.motion.q)
         middle, half = (tip.max(axis=0) + tip.min(axis=0)) / 2, np.maximum(np.ptp(tip, axis=0), _LEAST_BOX) / 2
         axes = [np.linspace(m - h, m + h, _CANDIDATES) for m, h in zip(middle, half, strict=True)]
-        goals = list(np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2))
-        nearest = [int(np.linalg.norm(tip - goal, axis=-1).argmin()) for goal in goals]
-        guesses = stroke.motion.q[nearest]
+        positions = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+        guesses = [stroke.motion.q[np.linalg.norm(tip - position, axis=-1).argmin()] for position in positions]
+        goals = [{"tip": position} for position in positions]
     kept = []
     for guess, goal in zip(guesses, goals, strict=True):
         try:
-            q = guess if goal is None else close_pins(linkage, guess, tip=goal)
+            q = close_pins(linkage, guess, **goal)
             place = Places.of(linkage, q[None])
         except InvalidValueError:
             continue
