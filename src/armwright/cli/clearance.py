@@ -5,6 +5,7 @@ from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
 from armwright.cli.clearance_reliability import reliability
+from armwright.cli.clearance_plan_checks import plan_checks
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_tolerance import tolerance
@@ -23,11 +24,13 @@ clearance.command("export")(export)
 clearance.command("tolerance")(tolerance)
 clearance.command("reliability")(reliability)
 clearance.command("vibration")(vibration)
+clearance.command("plan-checks")(plan_checks)
 
 
 @clearance.callback()
 def group() -> None:
     """Simulate, estimate, correct and compare linkages with clearance in their pins; how long they stay accurate.
+    """Simulate, estimate, correct, wear, maintain and compare linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """
