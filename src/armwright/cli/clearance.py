@@ -30,7 +30,6 @@ clearance.command("plan-checks")(plan_checks)
 @clearance.callback()
 def group() -> None:
     """Simulate, estimate, correct and compare linkages with clearance in their pins; how long they stay accurate.
-    """Simulate, estimate, correct, wear, maintain and compare linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """
