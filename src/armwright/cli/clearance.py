@@ -4,8 +4,8 @@ from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
-from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_plan_checks import plan_checks
+from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.clearance_tolerance import tolerance
