@@ -35,6 +35,7 @@ _STUDIES = {
     "puma-moves": ("puma_moves_study", "PumaMoves"),
     "five-bar-clearance": ("five_bar_clearance_study", "FiveBarClearance"),
     "dh-calibration": ("dh_calibration_study", "DhCalibration"),
+    "five-bar-life": ("five_bar_life", "FiveBarLife"),
     "identified-arm": ("identified_arm", "IdentifiedArm"),
 }
 STUDIES = tuple(_STUDIES)
