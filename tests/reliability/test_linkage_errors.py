@@ -107,6 +107,23 @@ def test_lengths_and_zeros(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(random.equilibria(z), random.drawn_errors(z), rtol=0, atol=1e-8)
 
 
+def test_friction(rng: np.random.Generator) -> None:
+    """Journals anywhere in their cones put the tip where complete equilibria do; the law is that of sampling."""
+    clearances = RandomClearances(mean=MEAN, covariance=np.eye(3) * DEVIATION**2)
+    q = closed_at_poses(five_bar(), [Q1, (0.0, -0.575)])
+    random = RandomLinkage.at(five_bar(), q, clearances, friction=True)
+    z = rng.normal(size=(20_000, random.size))
+    few = z[:50]
+    # The wall of a cone of 0.05 rad is curved: that is a thousandth of the clearance.
+    assert np.linalg.norm(random.equilibria(few) - random.drawn_errors(few), axis=-1).max() < 2e-3 * MEAN.sum()
+    assert random.shares.sum(axis=1) == pytest.approx([1, 1])
+    sizes = np.linalg.norm(random.drawn_errors(z), axis=-1)
+    limit = float(np.quantile(sizes.max(axis=1), 0.99))
+    found = random.error.path_probability(limit, samples=10_000)
+    assert found.probability == pytest.approx(0.01, abs=5 * np.hypot(found.standard_error, np.sqrt(0.01 / len(z))))
+    assert found.standard_error < 0.05 * found.probability
+
+
 def test_correlated_clearances(rng: np.random.Generator) -> None:
     """Of an estimate the covariance counts, normal or lognormal; shares add up to one."""
     root = rng.normal(size=(3, 3)) * 1e-5

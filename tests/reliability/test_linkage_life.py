@@ -55,7 +55,7 @@ def test_published_life() -> None:
     worn = MEAN + np.array([5e-5, 0, 0])
     limit = float(np.linalg.norm(linkage.random.errors(worn[None], np.zeros((1, 0)))))
 
-    life = LinkageLife.of(linkage, "error", limit, draw(linkage.size))
+    life = LinkageLife.of(linkage, "error", limit, draw(linkage.size, samples=16_384))
 
     exact = linkage.lives("error", limit, np.zeros((1, 4)))[0]
     assert exact == pytest.approx(5.405e6, rel=1e-4)

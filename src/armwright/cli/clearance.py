@@ -4,6 +4,7 @@ from armwright.cli.clearance_compare import compare
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_export import export
+from armwright.cli.clearance_plan_checks import plan_checks
 from armwright.cli.clearance_reliability import reliability
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
@@ -23,6 +24,7 @@ clearance.command("export")(export)
 clearance.command("tolerance")(tolerance)
 clearance.command("reliability")(reliability)
 clearance.command("vibration")(vibration)
+clearance.command("plan-checks")(plan_checks)
 
 
 @clearance.callback()

@@ -56,6 +56,9 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         Path | None, Option(help="Output of `clearance estimate --json`: mean and covariance of the clearances.")
     ] = None,
     lognormal: Annotated[bool, Option("--lognormal", help="Clearances are lognormal, and not normal.")] = False,
+    friction: Annotated[
+        bool, Option("--friction", help="Friction holds journals anywhere in their friction cones at each pose.")
+    ] = False,
     samples: Annotated[
         int | None,
         Option(
@@ -152,6 +155,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
                 lognormal=lognormal,
             ),
             deviations=_deviations(model, named),
+            friction=friction,
             limit=None if limit is None else limit * 1e-3,
             wear=wear,
             samples=samples,

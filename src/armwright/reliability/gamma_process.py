@@ -33,14 +33,14 @@ class GammaProcess(NamedTuple):
         probabilities: (m,) of each; they add up to one.
         strokes: that were measured.
         growth: over these [m] or [rad].
-        count: of increments.
+        increments: how many there were.
     """
 
     shapes: Array
     probabilities: Array
     strokes: float
     growth: float
-    count: int
+    increments: int
 
     def failure(self, growth: float, strokes: float) -> float:
         """Return the probability that the growth over strokes to come is larger than some growth.
@@ -49,12 +49,12 @@ class GammaProcess(NamedTuple):
             growth: what is left until the limit [m] or [rad].
             strokes: from the last measurement on.
         """
-        left, count = positive(growth, "growth"), not_negative(strokes, "strokes")
-        if not count:
+        left, coming = positive(growth, "growth"), not_negative(strokes, "strokes")
+        if not coming:
             return 0.0
         # The new growth by itself and the old one is beta, since the rate is that of both.
         part = left / (left + self.growth)
-        return float(self.probabilities @ betaincc(self.shapes * count, self.shapes * self.strokes, part))
+        return float(self.probabilities @ betaincc(self.shapes * coming, self.shapes * self.strokes, part))
 
     def quantile(self, growth: float, part: float) -> float:
         """Return the strokes to come after which the growth is larger than some growth with a probability.
@@ -112,5 +112,5 @@ def gamma_process(strokes: ArrayLike, growths: ArrayLike) -> GammaProcess:
         probabilities=probabilities / probabilities.sum(),
         strokes=float(n.sum()),
         growth=float(x.sum()),
-        count=len(n),
+        increments=len(n),
     )

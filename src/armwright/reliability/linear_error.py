@@ -25,6 +25,8 @@ _FLAT = 1e-9
 _NEAR = 0.7
 # Numbers of a block of samples.
 _BLOCK = 4_000_000
+# Samples at each pose where no exact law holds.
+_AT_POSE = 20_000
 # Halvings of the interval in which a ray fails, and how far out it is looked for, in its own length.
 _HALVINGS, _FARTHEST = 20, 16.0
 
@@ -106,7 +108,9 @@ class LinearError:
         """
         if self.exact is None:
             return np.array([exceedance(m, C, limit) for m, C in zip(self.offset, self.covariance, strict=True)])
-        return np.array([self._at(i).path_probability(limit).probability for i in range(len(self.offset))])
+        return np.array(
+            [self._at(i).path_probability(limit, samples=_AT_POSE).probability for i in range(len(self.offset))]
+        )
 
     def errors(self, z: Array) -> Array:
         """Return (m, p, d) the errors for standard normal numbers (m, k)."""

@@ -123,6 +123,12 @@ class LinkageReliability:
         return self.random.linkage
 
     @property
+    def _sources(self) -> tuple[str, ...]:
+        """What the error varies by: the dimensions, and the friction in each pin."""
+        held = tuple(f"{pin} friction" for pin in self.linkage.clearances) if self.random.friction else ()
+        return (*self.random.names, *held)
+
+    @property
     def worst_pose(self) -> int:
         """The pose, from 0, with the largest probability, or else the largest mean error."""
         sizes = np.linalg.norm(self.random.offset, axis=-1) if self.at_poses is None else self.at_poses
@@ -134,7 +140,13 @@ class LinkageReliability:
         clearances = self.random.clearances
         poses = counted(len(self.labels), "pose")
         others = ", other dimensions normal" * bool(self.random.deviations)
-        notes = [f"The tip rests at {poses}; clearances are {clearances.shape}{others}; only RP has friction."]
+        notes = [f"The tip rests at {poses}; clearances are {clearances.shape}{others}."]
+        if self.random.friction:
+            notes.append(
+                "Friction holds journals anywhere in their friction cones, at each pose anew, but not over the strokes."
+            )
+        else:
+            notes.append("There is no friction in the error: journals lie in the directions of their forces.")
         if clearances.below_zero > _BELOW_ZERO:
             notes.append(
                 f"A clearance would be below 0 with probability {clearances.below_zero:.2g}, and counts as 0 there; "
@@ -196,7 +208,7 @@ class LinkageReliability:
                     "name": label,
                     "mean_error": random.offset[p].tolist(),
                     "probability": None if self.at_poses is None else float(self.at_poses[p]),
-                    "shares": dict(zip(random.names, random.shares[p].tolist(), strict=True)),
+                    "shares": dict(zip(self._sources, random.shares[p].tolist(), strict=True)),
                 }
                 for p, label in enumerate(self.labels)
             ],
@@ -240,8 +252,8 @@ class LinkageReliability:
 
     def _probability_table(self, limit: float, at_poses: Array) -> ResultTable:
         worst = self.worst_pose
-        exact = self.random.clearances.shape == "normal"
-        rows = [(f"at {self.labels[worst]}", f"{at_poses[worst]:.3g}", "0, exact law" if exact else "")]
+        exact = self.random.error.exact is None
+        rows = [(f"at {self.labels[worst]}", f"{at_poses[worst]:.3g}", "0, exact law" if exact else "sampled")]
         if self.on_path is not None and len(self.labels) > 1:
             rows.append(
                 (
@@ -252,9 +264,9 @@ class LinkageReliability:
             )
         if self.after is not None:
             strokes, found = self.after
-            rows.append(
-                (f"at any, after {_count(strokes)} strokes", f"{found.probability:.3g}", f"{found.standard_error:.1g}")
-            )
+            cells = f"{found.probability:.3g}", f"{found.standard_error:.1g}"
+            none = f"none of {found.samples} draws", ""
+            rows.append((f"at any, after {_count(strokes)} strokes", *(cells if found.probability else none)))
         if self.beyond is not None:
             full = self.beyond[0]
             error = np.sqrt(full * (1 - full) / self.samples)
@@ -277,10 +289,11 @@ class LinkageReliability:
         pins = len(self.linkage.pins)
         units = {dimension.name: dimension.unit for dimension in dimensions_of(self.linkage)}
         rows = []
-        for i, name in enumerate(random.names):
+        for i, name in enumerate(self._sources):
             scale, unit = SHOWN[units.get(name, "m")]
             mean = f"{random.clearances.mean[i] * 1e3:.4f}" if i < pins else ""
-            rows.append((name, mean, f"{random.spreads[i] / scale:.4g} {unit}", f"{100 * random.shares[worst, i]:.1f}"))
+            spread = f"{random.spreads[i] / scale:.4g} {unit}" if i < len(random.names) else ""
+            rows.append((name, mean, spread, f"{100 * random.shares[worst, i]:.1f}"))
         return ResultTable(
             title=f"Dimensions, at {self.labels[worst]}",
             heads=("dimension", "mean mm", "deviation", "share of the variance, %"),
@@ -356,6 +369,7 @@ def assess_linkage(
     clearances: RandomClearances,
     *,
     deviations: Mapping[str, float] | None = None,
+    friction: bool = False,
     limit: float | None = None,
     wear: WearStatement | None = None,
     samples: int | None = None,
@@ -369,6 +383,7 @@ def assess_linkage(
         q: (p, n) coordinates with closed pins, at which the drives are locked; see ``rest_poses``.
         clearances: of the m pins.
         deviations: standard deviations of other dimensions by name [m, rad, kg, N].
+        friction: whether it holds the journals of the new linkage anywhere in their friction cones.
         limit: of the error [m].
         wear: of the linkage; without it there are no lives.
         samples: how many random linkages are computed in complete equilibrium: 2000 where none is said, or 200 where
@@ -381,14 +396,14 @@ def assess_linkage(
         UnknownNameError: there is no such dimension.
     """
     say = progress or (lambda _: None)
-    random = RandomLinkage.at(linkage, q, clearances, deviations)
+    random = RandomLinkage.at(linkage, q, clearances, deviations, friction=friction)
     count = integer(samples or _SAMPLES[bool(random.deviations)], "samples", least=2)
     if count * len(random.q) > _MOST_EQUILIBRIA:
         raise InvalidValueError(
             f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {count}"
         )
     say("random linkages in equilibrium")
-    z = np.random.default_rng(seed).normal(size=(count, len(random.names)))
+    z = np.random.default_rng(seed).normal(size=(count, random.size))
     linear, full = random.drawn_errors(z), random.equilibria(z, say)
     at_poses = on_path = beyond = None
     if limit is not None:
@@ -419,7 +434,7 @@ def _nonlinearity(random: RandomLinkage, linear: Array, full: Array) -> float:
 def _with_lives(
     assessed: LinkageReliability, wear: WearStatement, seed: int, say: Callable[[str], None]
 ) -> LinkageReliability:
-    random = assessed.random
+    random = attrs.evolve(assessed.random, friction=False)
     # Wear begins at the mean clearances.
     means = dict(zip(random.linkage.clearances, random.clearances.mean.tolist(), strict=True))
     mean = random.linkage.with_clearances(means)

@@ -10,6 +10,7 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import attrs
@@ -18,10 +19,11 @@ from scipy.special import ndtr
 
 from armwright.arrays import Array, ArrayLike, floats, not_negative, read_only
 from armwright.clearance.dimensions import dimensions_of
-from armwright.clearance.ideal import tip_position, tip_sensitivity
+from armwright.clearance.ideal import close_pins, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.clearance.wear.contact_history import rotate
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tip_errors import sampled_tip_errors
@@ -32,6 +34,8 @@ SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
 _FLAT = 1e-12
 # Equilibria that are solved at once.
 _BLOCK = 20_000
+# Standard deviation of a number that is evenly spread from -1 to 1.
+_EVEN = 1 / np.sqrt(3.0)
 # The least clearance that has a direction [m].
 _LEAST = 1e-9
 
@@ -127,6 +131,8 @@ class RandomLinkage:
         offset: (p, 2) error of the tip with mean dimensions [m].
         jacobian: (p, 2, m) its derivatives by the clearances.
         others: (p, 2, k) its derivatives by the other dimensions.
+        friction: whether it holds each journal anywhere in its friction cone, at each pose anew, with the same
+            probability; without it journals lie in the directions of their forces.
     """
 
     linkage: Linkage
@@ -136,6 +142,7 @@ class RandomLinkage:
     offset: Array
     jacobian: Array
     others: Array
+    friction: bool = False
 
     @classmethod
     def at(
@@ -144,6 +151,8 @@ class RandomLinkage:
         q: ArrayLike,
         clearances: RandomClearances,
         deviations: Mapping[str, float] | None = None,
+        *,
+        friction: bool = False,
     ) -> RandomLinkage:
         """Return a linkage at poses of rest, linear about its mean clearances.
 
@@ -152,6 +161,7 @@ class RandomLinkage:
             q: (p, n) coordinates with closed pins, at which the drives are locked.
             clearances: of its m pins.
             deviations: standard deviations of other dimensions by name [m, rad, kg, N].
+            friction: whether it holds journals anywhere in their friction cones.
 
         Raises:
             InvalidValueError: a pin carries no force at rest, or a number is out of its range.
@@ -174,6 +184,7 @@ class RandomLinkage:
             offset=found.tip - tip_position(linkage, closed),
             jacobian=found.of("clearance"),
             others=np.stack(columns, axis=-1) if columns else np.zeros((*found.tip.shape, 0)),
+            friction=friction and linkage.material.friction > 0,
         )
 
     @property
@@ -187,34 +198,64 @@ class RandomLinkage:
         return np.array([*self.clearances.deviations, *self.deviations.values()])
 
     @property
+    def size(self) -> int:
+        """How many standard normal numbers describe it: one for each dimension, and one for each journal at a pose."""
+        return len(self.names) + len(self.q) * len(self.linkage.pins) * self.friction
+
+    @property
     def error(self) -> LinearError:
         """The error of the tip, linear in deviations that are independent."""
-        linear = self.jacobian @ self.clearances.linear
+        linear, names = self.jacobian @ self.clearances.linear, self.names
+        columns, deviations = [linear, self.others], [1.0] * len(self.linkage.pins) + list(self.deviations.values())
+        if self.friction:
+            p, _, m = self.jacobian.shape
+            own = np.zeros((p, 2, p, m))
+            own[range(p), :, range(p)] = self.across * self.clearances.mean
+            columns.append(own.reshape(p, 2, p * m))
+            names += tuple(f"{pin} friction {i + 1}" for i in range(p) for pin in self.linkage.clearances)
+            deviations += [self.cone * _EVEN] * (p * m)
+        is_linear = self.clearances.shape == "normal" and not self.friction
         return LinearError(
-            names=self.names,
-            deviations=[1.0] * len(self.linkage.pins) + list(self.deviations.values()),
+            names=names,
+            deviations=deviations,
             offset=self.offset,
-            jacobian=np.concatenate([linear, self.others], axis=-1),
-            exact=None if self.clearances.shape == "normal" else self.drawn_errors,
+            jacobian=np.concatenate(columns, axis=-1),
+            exact=None if is_linear else self.drawn_errors,
         )
 
     def drawn_errors(self, z: Array) -> Array:
-        """Return (s, p, 2) errors by the linear law, of linkages that numbers (s, m + k) describe [m]."""
-        m = len(self.linkage.pins)
-        return self.errors(self.clearances.values(z[:, :m]), z[:, m:] * self.spreads[m:])
+        """Return (s, p, 2) errors by the linear law, of linkages that numbers (s, size) describe [m]."""
+        m, k = len(self.linkage.pins), len(self.names)
+        clearances = self.clearances.values(z[:, :m])
+        errors = self.errors(clearances, z[:, m:k] * self.spreads[m:])
+        if self.friction:
+            errors += np.einsum("pam,spm->spa", self.across, clearances[:, None] * self._tilts(z))
+        return errors
+
+    @property
+    def cone(self) -> float:
+        """Half angle of the friction cones [rad]."""
+        return float(np.arctan(self.linkage.material.friction))
+
+    def _tilts(self, z: Array) -> Array:
+        """Return (s, p, m) angles of journals beside their forces, evenly spread over the cones [rad]."""
+        own = z[:, len(self.names) :].reshape(len(z), len(self.q), len(self.linkage.pins))
+        return np.asarray(self.cone * (2 * ndtr(own) - 1))
 
     @property
     def shares(self) -> Array:
         """(p, m + k) part of each dimension in the variance of the error at each pose; rows add up to one.
 
-        Of correlated clearances one that balances another has a negative part.
+        Of correlated clearances one that balances another has a negative part. With friction there are m parts more,
+        those of the friction in each pin.
         """
         own = (self.jacobian * (self.jacobian @ self.clearances.covariance)).sum(axis=1)
         rest = ((self.others * np.array(list(self.deviations.values()))) ** 2).sum(axis=1)
-        parts = np.concatenate([own, rest], axis=-1)
+        held = (self.across * self.clearances.mean * self.cone * _EVEN) ** 2
+        parts = np.concatenate([own, rest, *([held.sum(axis=1)] if self.friction else [])], axis=-1)
         return np.asarray(parts / np.maximum(parts.sum(axis=-1, keepdims=True), np.finfo(float).tiny))
 
-    @property
+    @cached_property
     def across(self) -> Array:
         """(p, 2, m) shift of the tip by the angle at which a journal lies beside its force, by its clearance."""
         rest = find_static_equilibrium(self.linkage, self.q, np.maximum(self.clearances.mean, _LEAST))
@@ -234,7 +275,7 @@ class RandomLinkage:
         return np.asarray(errors + np.tensordot(shifts, self.others, axes=([1], [2])))
 
     def equilibria(self, z: Array, say: Callable[[str], None] | None = None) -> Array:
-        """Return (s, p, 2) errors in complete equilibrium, of linkages that numbers (s, m + k) describe [m].
+        """Return (s, p, 2) errors in complete equilibrium, of linkages that numbers (s, size) describe [m].
 
         Args:
             z: standard normal numbers.
@@ -243,13 +284,23 @@ class RandomLinkage:
         Raises:
             InvalidValueError: one of the linkages cannot be assembled.
         """
-        m = len(self.linkage.pins)
+        m, k = len(self.linkage.pins), len(self.names)
         clearances = self.clearances.values(z[:, :m])
         if self.deviations:
             means = dict(zip(self.linkage.clearances, self.clearances.mean.tolist(), strict=True))
             names = [*(f"{pin}.clearance" for pin in means), *self.deviations]
-            steps = np.concatenate([clearances - self.clearances.mean, z[:, m:] * self.spreads[m:]], axis=1)
-            return sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps, say)
-        blocks = np.array_split(clearances, max(1, len(clearances) * len(self.q) // _BLOCK))
-        tips = [find_static_equilibrium(self.linkage, self.q, block[:, None]).tip for block in blocks]
+            steps = np.concatenate([clearances - self.clearances.mean, z[:, m:k] * self.spreads[m:]], axis=1)
+            errors = sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps, say)
+            return errors + (self.drawn_errors(z) - attrs.evolve(self, friction=False).drawn_errors(z))
+        rows = np.array_split(np.arange(len(z)), max(1, len(z) * len(self.q) // _BLOCK))
+        tips = [self._tips(clearances[block], z[block]) for block in rows]
         return np.concatenate(tips) - tip_position(self.linkage, self.q)
+
+    def _tips(self, clearances: Array, z: Array) -> Array:
+        """Return (s, p, 2) positions of the tip in equilibrium [m]."""
+        rest = find_static_equilibrium(self.linkage, self.q, clearances[:, None])
+        if not self.friction:
+            return rest.tip
+        drives = self.q[:, list(self.linkage.driven)]
+        gaps = rotate(rest.gaps, self._tilts(z))
+        return tip_position(self.linkage, close_pins(self.linkage, rest.q, drives=drives, gaps=gaps))

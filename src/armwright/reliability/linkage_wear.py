@@ -108,7 +108,7 @@ class WearingLinkage:
     that of each pin.
 
     Attributes:
-        random: the new linkage at p poses, with m pins.
+        random: the new linkage at p poses, with m pins, without friction but in its repeatability.
         growth: of its gaps.
         median: of the wear coefficient [m²/N].
         spread: standard deviation of its logarithm.
@@ -123,6 +123,8 @@ class WearingLinkage:
 
     def __attrs_post_init__(self) -> None:
         """Check the ranges."""
+        if self.random.friction:
+            raise InvalidValueError("random: expected a linkage without friction: where journals lie is new every time")
         positive(self.median, "wear coefficient")
         not_negative(self.spread, "spread of the wear coefficient")
         if not (self.growth.lengths[-1] > 0).any():
@@ -240,7 +242,7 @@ class WearingLinkage:
     def _friction(self) -> tuple[Array, Array]:
         """Variance of the tip by squared gap (p, m), and RP by the root of the variance (p,)."""
         mean = self.random.clearances.mean
-        across = self.random.across * float(np.arctan(self.linkage.material.friction))
+        across = self.random.across * self.random.cone
         tilts = np.random.default_rng(0).uniform(-1, 1, (_VISITS, len(mean)))
         lengths = np.linalg.norm(np.tensordot(tilts * mean, across, axes=([1], [2])), axis=-1)
         # An even spread from -1 to 1 has the variance of a third.

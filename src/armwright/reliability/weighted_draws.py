@@ -80,7 +80,7 @@ class WeightedDraws:
 
 
 def draw(
-    size: int, residuals: Callable[[Array], Array] | None = None, *, samples: int = 16_384, seed: int = 0
+    size: int, residuals: Callable[[Array], Array] | None = None, *, samples: int = 8192, seed: int = 0
 ) -> WeightedDraws:
     """Draw numbers that are standard normal before measurements.
 

@@ -187,7 +187,7 @@ def _rest_measurement(table: UnitTable, numbers: Array, groups: Mapping[str, lis
         if np.any(np.ptp(values[:, :2], axis=0) > 0):
             raise table.error(rows[0], name, "this pose is commanded at different positions")
         errors = values[:, 2:] - values[:, :2]
-        _refuse_large_errors(table, rows[0], name, errors)
+        refuse_large_errors(table, rows[0], name, errors)
         poses.append(values[0, :2])
         offsets.append(errors.mean(axis=0))
         counts.append(len(rows))
@@ -226,11 +226,11 @@ def _path_measurement(table: UnitTable, numbers: Array, groups: Mapping[str, lis
         during_path = t <= path.duration + 0.5 * steps.mean()
         times[name] = t[during_path]
         errors[name] = values[during_path, 1:] - path.evaluate(times[name]).position
-        _refuse_large_errors(table, rows[0], name, errors[name])
+        refuse_large_errors(table, rows[0], name, errors[name])
     return PathMeasurement(times=times, errors=errors)
 
 
-def _refuse_large_errors(table: UnitTable, row: int, name: str, errors: Array) -> None:
+def refuse_large_errors(table: UnitTable, row: int, name: str, errors: Array) -> None:
     """Refuse errors (s, 2) of the tip that no clearance explains [m]."""
     worst = float(np.hypot(errors[:, 0], errors[:, 1]).max())
     if worst > _MAX_ERROR:

@@ -118,9 +118,9 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
 
 
 def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles) -> Array:
-    """Return (s, p) sliding velocities [m/s] of journals whose gaps (s, p, 2) in the ground's axes are known [m]."""
+    """Return (..., s, p) sliding velocities [m/s] of journals with gaps (..., s, p, 2) in the ground's axes [m]."""
     outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
-    return _slips(linkage, gaps, outward, np.gradient(gaps, time, axis=0), angles)
+    return _slips(linkage, gaps, outward, np.gradient(gaps, time, axis=-3), angles)
 
 
 def rotate(vectors: Array, angles: Array) -> Array:
@@ -130,7 +130,7 @@ def rotate(vectors: Array, angles: Array) -> Array:
 
 
 def _slips(linkage: Linkage, gaps: Array, outward: Array, velocities: Array, angles: PinAngles) -> Array:
-    """Return (s, p) velocities of the surfaces of journals along walls of these normals (s, p, 2)."""
+    """Return (..., s, p) velocities of the surfaces of journals along walls of these normals (..., s, p, 2)."""
     radii = np.array([pin.journal_radius for pin in linkage.pins])
     along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
     wall = radii + (gaps * outward).sum(axis=-1)

@@ -1,0 +1,248 @@
+"""What is known of the clearances and wear coefficients of pins: samples, updated by what a check measures.
+
+Between checks clearances grow after the table, and scatter about it as sums of independent grains do. At a check the
+samples are described by a normal distribution of clearances and logarithms of wear coefficients; the posterior is
+found by importance sampling about its mode, so that neither a wide prior nor an accurate reading leaves few samples.
+
+Source:
+    Kotecha and Djurić, "Gaussian particle filtering", IEEE Transactions on Signal Processing 51 (2003); spec of the
+    life, 5.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, Numbers, integer, not_negative, positive
+from armwright.clearance.maintenance.wearing_linkage import GrowthTable
+from armwright.errors import InvalidValueError, ShapeError
+
+# No pin has less [m].
+_LEAST_CLEARANCE = 1e-7
+# Degrees of freedom of the proposal: its tails are wider than those of the posterior.
+_TAILS = 6.0
+_FEWEST, _MOST = 100, 100_000
+# A logarithm within which no wear coefficient is bounded by rounding.
+_WIDEST = 5.0
+# A normal deviate of which nineteen in twenty are not larger.
+_DEVIATE = 1.6448536269514722
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class WearPrior:
+    """What is known of p pins before any measurement.
+
+    Attributes:
+        clearances: (p,) means of new pins [m].
+        clearance_spread: standard deviation of each [m].
+        coefficients: (p,) medians of the wear coefficients [m²/N].
+        spread: standard deviation of the logarithm that all pins have in common.
+        pin_spread: standard deviation of the logarithm of a single bearing about that of all.
+        grain: of wear: the variance of a growth divided by its mean [m].
+        scatter: standard deviation of a growth between two checks, as a part of its mean: how well its law is known.
+    """
+
+    clearances: Array
+    clearance_spread: float
+    coefficients: Array
+    spread: float
+    pin_spread: float
+    grain: float
+    scatter: float = 0.05
+
+    def __attrs_post_init__(self) -> None:
+        """Check the ranges."""
+        if self.clearances.ndim != 1 or self.coefficients.shape != self.clearances.shape:
+            raise ShapeError(
+                f"expected clearances and wear coefficients (p,), got {self.clearances.shape} and "
+                f"{self.coefficients.shape}"
+            )
+        if not np.all(self.clearances > 0):
+            raise InvalidValueError(f"clearances: expected more than 0, got {self.clearances.min() * 1e3:g} mm")
+        for coefficient in self.coefficients:
+            positive(float(coefficient), "wear coefficient")
+        not_negative(self.clearance_spread, "spread of the clearances")
+        not_negative(self.grain, "grain of the wear")
+        not_negative(self.scatter, "scatter of the wear")
+        for name, spread in (("spread", self.spread), ("pin spread", self.pin_spread)):
+            if not_negative(spread, f"{name} of the wear coefficients") > _WIDEST:
+                raise InvalidValueError(
+                    f"{name} of the wear coefficients: expected at most {_WIDEST:g}, got {spread:g}"
+                )
+
+    @property
+    def fastest(self) -> float:
+        """The largest wear coefficient that has to be expected: nineteen in twenty are smaller [m²/N]."""
+        return float(self.coefficients.max() * np.exp(_DEVIATE * np.hypot(self.spread, self.pin_spread)))
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+        """Return (count, p) clearances [m] and logarithms of wear coefficients."""
+        shape = (count, len(self.clearances))
+        logs = np.log(self.coefficients) + self.spread * rng.standard_normal((count, 1))
+        logs = logs + self.pin_spread * rng.standard_normal(shape)
+        clearances = self.clearances + self.clearance_spread * rng.standard_normal(shape)
+        return np.maximum(clearances, _LEAST_CLEARANCE), logs
+
+    def growth_deviation(self, growth: Array) -> Array:
+        """Return the standard deviations of growths of the same shape [m]."""
+        return np.sqrt(self.grain * growth + (self.scatter * growth) ** 2)
+
+    def new_bearing(self, pin: int, logs: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Return (s,) clearances [m] and logarithms of a new bearing, beside pins with logarithms (s, p).
+
+        It wears as the others do, but for its own scatter: the logarithms of all tell what they have in common.
+        """
+        count, p = logs.shape
+        own, common, single = logs - np.log(self.coefficients), self.spread**2, self.pin_spread**2
+        if single == 0:
+            level = own.mean(axis=1)
+        else:
+            variance = common * single / (single + p * common)
+            level = own.sum(axis=1) * variance / single + np.sqrt(variance) * rng.standard_normal(count)
+        clearances = self.clearances[pin] + self.clearance_spread * rng.standard_normal(count)
+        single_logs = np.log(self.coefficients[pin]) + level + self.pin_spread * rng.standard_normal(count)
+        return np.maximum(clearances, _LEAST_CLEARANCE), single_logs
+
+
+class Measured(NamedTuple):
+    """What a check says of the clearances: values = design · c + normal errors.
+
+    Attributes:
+        design: (k, p).
+        values: (k,) [m].
+        covariance: (k, k) of their errors [m²].
+    """
+
+    design: Array
+    values: Array
+    covariance: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Belief:
+    """Samples of the state of p pins after some strokes, each as probable as any other.
+
+    Attributes:
+        prior: of new pins.
+        table: growth of the clearances.
+        strokes: done.
+        clearances: (s, p) [m].
+        logs: (s, p) natural logarithms of the wear coefficients [m²/N].
+        misfit: sum of the squares by which the last check and what was believed before disagree at least, in standard
+            deviations; it follows chi-square with as many degrees of freedom as values were measured.
+    """
+
+    prior: WearPrior
+    table: GrowthTable
+    strokes: float
+    clearances: Array
+    logs: Array
+    misfit: float = 0.0
+
+    @classmethod
+    def new(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
+        """Return what is known of new pins."""
+        if not _FEWEST <= integer(samples, "samples", least=1) <= _MOST:
+            raise InvalidValueError(f"samples: expected {_FEWEST} to {_MOST}, got {samples}")
+        clearances, logs = prior.draw(rng, samples)
+        return cls(prior=prior, table=table, strokes=0.0, clearances=clearances, logs=logs)
+
+    def forecast(self, strokes: Array, noise: Array) -> Array:
+        """Return (n, s, p) clearances after as many strokes (n,) altogether.
+
+        Args:
+            strokes: none before those already done.
+            noise: (s, p) standard normal numbers, of the scatter of the growth [1].
+        """
+        exposure = (strokes[:, None, None] - self.strokes) * np.exp(self.logs)
+        mean = self.table.grown(self.clearances, exposure)
+        return np.maximum(mean + self.prior.growth_deviation(mean - self.clearances) * noise, _LEAST_CLEARANCE)
+
+    def at(self, strokes: float, rng: np.random.Generator) -> Belief:
+        """Return what is known after more strokes, without a measurement."""
+        noise = rng.standard_normal(self.clearances.shape)
+        return attrs.evolve(self, strokes=strokes, clearances=self.forecast(np.array([strokes]), noise)[0])
+
+    def updated(self, strokes: float, measured: Measured, rng: np.random.Generator) -> Belief:
+        """Return what is known after a check.
+
+        Args:
+            strokes: at which it was made.
+            measured: by it.
+            rng: for the samples.
+
+        Raises:
+            InvalidValueError: the check is earlier than what is known, or its errors have no covariance.
+        """
+        from scipy.optimize import least_squares  # noqa: PLC0415 - a slow import
+
+        if strokes < self.strokes:
+            raise InvalidValueError(f"strokes: expected at least {self.strokes:g}, got {strokes:g}")
+        state = np.concatenate([self.clearances, self.logs], axis=-1)
+        p, (count, size) = self.clearances.shape[1], state.shape
+        mean, factor = state.mean(axis=0), _root(np.cov(state, rowvar=False))
+        try:
+            whiten = np.linalg.inv(np.linalg.cholesky(measured.covariance))
+        except np.linalg.LinAlgError:
+            raise InvalidValueError("measured: expected a positive definite covariance") from None
+
+        def states(u: Array) -> tuple[Array, Array]:
+            """Return clearances now and logarithms, for rows of independent standard normal numbers (..., 3 p)."""
+            before = mean + u[..., :size] @ factor.T
+            c, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., p:]
+            grown = self.table.grown(c, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
+            return grown + self.prior.growth_deviation(grown - c) * u[..., size:], logs
+
+        def residuals(u: Array) -> Array:
+            misfit = measured.values - states(u)[0] @ measured.design.T
+            return np.concatenate([u, misfit @ whiten.T], axis=-1)
+
+        found = least_squares(residuals, np.zeros(size + p), method="lm", diff_step=1e-6)
+        spread = np.linalg.cholesky(np.linalg.inv(found.jac.T @ found.jac))
+        normal = rng.standard_normal((count, size + p))
+        scale = np.sqrt(_TAILS / rng.chisquare(_TAILS, (count, 1)))
+        u = found.x + (normal * scale) @ spread.T
+        # The logarithm of a density of Student, without its constant.
+        proposed = -0.5 * (_TAILS + size + p) * np.log1p(((normal * scale) ** 2).sum(axis=-1) / _TAILS)
+        weights = -0.5 * (residuals(u) ** 2).sum(axis=-1) - proposed
+        weights = np.exp(weights - weights.max())
+        u = u[_systematic_sample(weights, rng)]
+        clearances, logs = states(u)
+        clearances = np.maximum(clearances, _LEAST_CLEARANCE)
+        return attrs.evolve(
+            self, strokes=strokes, clearances=clearances, logs=logs, misfit=float(found.fun @ found.fun)
+        )
+
+    def with_new_bearing(self, pin: int, rng: np.random.Generator) -> Belief:
+        """Return what is known after a bearing was changed."""
+        clearances, logs = self.clearances.copy(), self.logs.copy()
+        clearances[:, pin], logs[:, pin] = self.prior.new_bearing(pin, self.logs, rng)
+        return attrs.evolve(self, clearances=clearances, logs=logs)
+
+    def interval(self, level: float = 0.9) -> tuple[Array, Array]:
+        """Return (2, p) the bounds between which clearances [m] and wear coefficients [m²/N] lie with a probability."""
+        if not 0 < level < 1:
+            raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
+        bounds = (0.5 - level / 2, 0.5 + level / 2)
+        return np.quantile(self.clearances, bounds, axis=0), np.exp(np.quantile(self.logs, bounds, axis=0))
+
+
+# ---- inside --------------------------------------------------------------------------------------------------------
+
+
+def _root(covariance: Array) -> Array:
+    """Return a matrix whose product with its transpose is a covariance, singular or not."""
+    scale = np.sqrt(np.diag(covariance))
+    safe = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(safe, safe))
+    return np.asarray(safe[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _systematic_sample(weights: Array, rng: np.random.Generator) -> Numbers:
+    """Return as many numbers of samples as there are weights, each as often as its weight asks for."""
+    total = np.cumsum(weights)
+    places = (np.arange(len(weights)) + rng.random()) * (total[-1] / len(weights))
+    return np.asarray(np.minimum(np.searchsorted(total, places), len(weights) - 1))

@@ -1,0 +1,284 @@
+"""The strategy: when the next check is due, which corrections of the path come before it, and which bearing to change.
+
+The path is corrected for the mean clearances, ahead by half of what they will grow until it is corrected again, which
+takes no stop. The error that is left is that of the spread, and of friction; the next check is due when it passes the
+limit with the probability alpha. Where a check and a correction no longer help for long, a bearing is changed.
+
+Source:
+    Spec of the life, 5.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, integer, not_negative, positive
+from armwright.clearance.maintenance.belief import Belief, Measured
+from armwright.clearance.maintenance.wearing_linkage import Places, WearingLinkage
+from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.errors import InvalidValueError
+
+# The mean clearances move the tip by at most this part of the limit from where the correction holds it.
+_DRIFT_SHARE = 0.2
+# Strokes at which the probability is computed, twice: over all, and between the two that it passes alpha.
+_COARSE, _FINE = 12, 8
+# Corrections in a horizon at most, and strokes at which the mean drift is computed.
+_MOST_CORRECTIONS, _DRIFT_POINTS = 500, 40
+_LEAST_ALPHA, _MOST_STOPS = 1e-3, 1000
+
+
+@attrs.frozen(kw_only=True)
+class Strategy:
+    """What a plan is to achieve, and what a check can do.
+
+    Attributes:
+        limit: of the error of the tip along the corrected path [m].
+        alpha: probability of an error beyond it at which a check is due.
+        horizon: strokes that are planned.
+        least_interval: strokes for which a check at least should help; where it does not, a bearing is changed.
+        change_at: clearance at which a bearing is changed in any case [m].
+        noise: standard deviation of one coordinate of a reading [m].
+        readings: of each pose in a check, each approached anew.
+    """
+
+    limit: float
+    alpha: float
+    horizon: float
+    least_interval: float
+    change_at: float = np.inf
+    noise: float = 1e-5
+    readings: int = 5
+
+    def __attrs_post_init__(self) -> None:
+        """Check the ranges."""
+        positive(self.limit, "limit", "m")
+        positive(self.horizon, "horizon", "strokes")
+        positive(self.least_interval, "least interval", "strokes")
+        positive(self.noise, "noise", "m")
+        integer(self.readings, "readings", least=1)
+        if not _LEAST_ALPHA <= not_negative(self.alpha, "alpha") <= 0.5:
+            raise InvalidValueError(f"alpha: expected {_LEAST_ALPHA:g} to 0.5, got {self.alpha:g}")
+        if self.horizon / self.least_interval > _MOST_STOPS:
+            raise InvalidValueError(
+                f"least interval: expected at least 1/{_MOST_STOPS} of the horizon, "
+                f"{self.horizon / _MOST_STOPS:g} strokes, got {self.least_interval:g}"
+            )
+        if not self.least_interval <= self.horizon:
+            raise InvalidValueError(
+                f"least interval: expected at most the horizon, {self.horizon:g} strokes, got {self.least_interval:g}"
+            )
+        if not self.change_at > 0:
+            raise InvalidValueError(f"change at: expected a clearance above 0, got {self.change_at * 1e3:g} mm")
+
+
+class Corrections(NamedTuple):
+    """Corrected paths, each from its number of strokes to the next.
+
+    Attributes:
+        strokes: (j,) increasing.
+        clearances: (j, p) for which they are corrected [m].
+    """
+
+    strokes: Array
+    clearances: Array
+
+    def at(self, strokes: Array) -> Array:
+        """Return (n, p) the clearances for which the path is corrected after strokes (n,)."""
+        rows = np.searchsorted(self.strokes, strokes, side="right") - 1
+        return np.asarray(self.clearances[np.maximum(rows, 0)])
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class NextStop:
+    """Until when nothing has to be measured.
+
+    Attributes:
+        strokes: at which the next check is due; infinite where none is within the horizon.
+        change: strokes at which the first mean clearance reaches that of a change; infinite likewise.
+        corrections: until then, and after.
+        times: (n,) strokes at which the probability was computed.
+        probabilities: (n,) of an error beyond the limit there.
+    """
+
+    strokes: float
+    change: float
+    corrections: Corrections
+    times: Array
+    probabilities: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Planner:
+    """Plans for one linkage and one strategy, always with the same random numbers.
+
+    Attributes:
+        machine: the linkage on its path.
+        strategy: to follow.
+        growth_noise: (s, p) standard normal numbers.
+        shifts: (s, 2 m, p) of the tip by clearance, with journals somewhere in their friction cones.
+    """
+
+    machine: WearingLinkage
+    strategy: Strategy
+    growth_noise: Array
+    shifts: Array
+
+    @classmethod
+    def of(cls, machine: WearingLinkage, strategy: Strategy, samples: int = 1000, seed: int = 0) -> Planner:
+        """Return the planner for beliefs of so many samples."""
+        rng = np.random.default_rng([seed, 1])
+        pins, watched = len(machine.linkage.pins), machine.watched
+        tilts = machine.cone * rng.uniform(-1.0, 1.0, (samples, len(watched.q), 1, pins))
+        return cls(
+            machine=machine,
+            strategy=strategy,
+            growth_noise=rng.standard_normal((samples, pins)),
+            shifts=(watched.along + watched.across * tilts).reshape(samples, -1, pins),
+        )
+
+    def corrections(self, belief: Belief) -> Corrections:
+        """Return the corrected paths for the mean clearances, from now to the horizon."""
+        now, end = belief.strokes, max(self.strategy.horizon, belief.strokes * (1 + 1e-9))
+        times = now + np.linspace(0.0, 1.0, _DRIFT_POINTS) ** 2 * (end - now)
+        means = belief.forecast(times, np.zeros_like(belief.clearances)).mean(axis=1)
+        shifts = np.einsum("mip,np->nmi", self.machine.shift_by_clearance(), means - means[0])
+        drift = np.maximum.accumulate(np.linalg.norm(shifts, axis=-1).max(axis=-1))
+        step = 2 * _DRIFT_SHARE * self.strategy.limit
+        count = min(int(drift[-1] / step) + 1, _MOST_CORRECTIONS)
+        # Where the drift stands still its inverse has no value; the last of equal ones is taken.
+        rising = np.append(True, np.diff(drift) > 0)
+
+        starts, middles = (
+            np.interp(step * (np.arange(count) + part), drift[rising], times[rising]) for part in (0.0, 0.5)
+        )
+        clearances = np.stack([np.interp(middles, times, column) for column in means.T], axis=-1)
+        return Corrections(starts, clearances)
+
+    def probabilities(self, belief: Belief, corrections: Corrections, times: Array) -> Array:
+        """Return (n,) the probability that a stroke is out of limit anywhere, after strokes (n,)."""
+        clearances = belief.forecast(times, self.growth_noise)
+        taken = corrections.at(times) @ self.machine.shift_by_clearance().reshape(-1, clearances.shape[-1]).T
+        errors = self.shifts @ np.moveaxis(clearances, 0, -1) - taken.T
+        squares = (errors**2).reshape(len(errors), -1, 2, len(times)).sum(axis=2)
+        return np.asarray((squares.max(axis=1) > self.strategy.limit**2).mean(axis=0))
+
+    def next_stop(self, belief: Belief) -> NextStop:
+        """Return when the next check is due; at the latest when a mean clearance reaches that of a change."""
+        strategy, now = self.strategy, belief.strokes
+        corrections = self.corrections(belief)
+        least = strategy.least_interval / 10
+        if now + least >= strategy.horizon:
+            return NextStop(
+                strokes=np.inf,
+                change=np.inf,
+                corrections=corrections,
+                times=np.array([now]),
+                probabilities=np.zeros(1),
+            )
+        times = now + np.append(0.0, np.geomspace(least, strategy.horizon - now, _COARSE))
+        probabilities = self.probabilities(belief, corrections, times)
+        over = np.flatnonzero(probabilities >= strategy.alpha)
+        due = np.inf
+        if len(over) and over[0] == 0:
+            due = now
+        elif len(over):
+            between = np.linspace(times[over[0] - 1], times[over[0]], _FINE + 2)
+            finer = np.concatenate(
+                [
+                    [probabilities[over[0] - 1]],
+                    self.probabilities(belief, corrections, between[1:-1]),
+                    [probabilities[over[0]]],
+                ]
+            )
+            k = int(np.flatnonzero(finer >= strategy.alpha)[0])
+            part = (strategy.alpha - finer[k - 1]) / (finer[k] - finer[k - 1])
+            due = float(between[k - 1] + part * (between[k] - between[k - 1]))
+            times = np.append(times, between[1:-1])
+            probabilities = np.append(probabilities, finer[1:-1])
+        order = np.argsort(times)
+        change = self._change_due(belief)
+        due = min(due, change)
+        return NextStop(
+            strokes=due if due < strategy.horizon else np.inf,
+            change=change,
+            corrections=corrections,
+            times=times[order],
+            probabilities=probabilities[order],
+        )
+
+    def changes(self, belief: Belief, rng: np.random.Generator) -> tuple[Belief, tuple[int, ...], NextStop]:
+        """Return what is known after the bearings that are due were changed, their numbers, and the next stop."""
+        strategy, changed = self.strategy, []
+        enough = min(belief.strokes + strategy.least_interval, strategy.horizon)
+        beyond = self._means_at(belief, belief.strokes + strategy.least_interval) > strategy.change_at
+        for pin in np.flatnonzero(beyond).tolist():
+            belief = belief.with_new_bearing(pin, rng)
+            changed.append(pin)
+        stop = self.next_stop(belief)
+        while min(stop.strokes, strategy.horizon) < enough:
+            tried = {}
+            for pin in set(range(len(beyond))) - set(changed):
+                other = belief.with_new_bearing(pin, rng)
+                tried[pin] = other, self.next_stop(other)
+            better = {pin: result for pin, result in tried.items() if result[1].strokes > stop.strokes}
+            if not better:
+                break
+            pin = max(better, key=lambda k: better[k][1].strokes)
+            belief, stop = better[pin]
+            changed.append(pin)
+        return belief, tuple(changed), stop
+
+    def _change_due(self, belief: Belief) -> float:
+        """Return the strokes after which a mean clearance reaches that at which its bearing is changed."""
+        strategy = self.strategy
+        if not np.isfinite(strategy.change_at):
+            return np.inf
+        times = np.linspace(belief.strokes, strategy.horizon, _DRIFT_POINTS)
+        means = belief.forecast(times, np.zeros_like(belief.clearances)).mean(axis=1).max(axis=-1)
+        over = np.flatnonzero(means >= strategy.change_at)
+        if not len(over):
+            return np.inf
+        k = int(over[0])
+        if k == 0:
+            return belief.strokes
+        part = (strategy.change_at - means[k - 1]) / (means[k] - means[k - 1])
+        return float(times[k - 1] + part * (times[k] - times[k - 1]))
+
+    def _means_at(self, belief: Belief, strokes: float) -> Array:
+        """Return (p,) mean clearances after strokes [m]."""
+        return np.asarray(belief.forecast(np.array([strokes]), np.zeros_like(belief.clearances))[0].mean(axis=0))
+
+
+def read_offsets(  # noqa: PLR0917 - what a check consists of
+    machine: WearingLinkage, poses: Places, offsets: Array, readings: Array, noise: float, believed: Array
+) -> list[Measured]:
+    """Return what the offsets of the resting tip of n linkages say of their clearances.
+
+    The equations are linear about what was believed before; their errors are those of the readings, and of friction,
+    which holds each journal anywhere in its cone at every approach.
+
+    Args:
+        machine: that was measured.
+        poses: k of them.
+        offsets: (n, k, 2) of the tip, means of the readings [m].
+        readings: (k,) numbers of readings.
+        noise: standard deviation of a coordinate of one reading [m].
+        believed: (n, p) mean clearances before [m].
+    """
+    linkage, count = machine.linkage, len(poses.q)
+    about = believed[:, None]
+    rest = find_static_equilibrium(linkage, poses.q, about, contact_stiffness(linkage, about))
+    design = poses.along.reshape(2 * count, -1)
+    rows = []
+    for offset, tip, c in zip(offsets, rest.tip - poses.tip, believed, strict=True):
+        errors = poses.friction_covariance(c, machine.cone) + noise**2 * np.eye(2)
+        covariance = np.zeros((count, 2, count, 2))
+        for k in range(count):
+            covariance[k, :, k] = errors[k] / readings[k]
+        values = (offset - tip).ravel() + design @ c
+        rows.append(Measured(design=design, values=values, covariance=covariance.reshape(2 * count, 2 * count)))
+    return rows
