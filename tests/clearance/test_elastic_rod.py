@@ -14,11 +14,15 @@ from armwright.clearance.equations import Contact, ContactMemory, FrictionModel,
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, BodyPoint, Drive, Guide, Linkage, Pin
 from armwright.clearance.natural_modes import natural_modes
+from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage, read_linkage
 from armwright.clearance.scenario import assembly_guess
+from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.clearance.vibration.contact_modes import contact_modes
+from armwright.clearance.wear.assessment import assess_wear
+from armwright.clearance.wear.worn_surfaces import WearLaw
 from armwright.errors import FileFormatError, InvalidValueError, UnknownNameError
 from clearance.elastic_bodies import AREA, EI, LENGTH, MASS, YOUNG, bar, cantilever, elastic_five_bar, on_rollers
 
@@ -248,6 +252,15 @@ def test_joints_that_are_refused() -> None:
     both = [Drive(body="rod", kind="motion"), Drive(body="lever", kind="motion")]
     with pytest.raises(InvalidValueError, match="drive of lever: its motion cannot be given against an elastic body"):
         attrs.evolve(held, drives=both)
+
+
+def test_commands_for_rigid_bodies() -> None:
+    """Wear and sensitivities of all dimensions take rigid bodies, and name the elastic ones."""
+    linkage = elastic_five_bar(modes=1)
+    with pytest.raises(InvalidValueError, match="wear: expected rigid bodies, got elastic link2, link3"):
+        assess_wear(linkage, thesis_path("y1"), WearLaw(coefficient=1e-14))
+    with pytest.raises(InvalidValueError, match="sensitivities of the tip: expected rigid bodies, got elastic link2"):
+        rest_sensitivities(linkage, np.zeros(8))
 
 
 @pytest.mark.parametrize(

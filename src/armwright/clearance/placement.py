@@ -111,7 +111,7 @@ class PlacedRod(NamedTuple):
         frame: of its body, with its axis from the first end of the rod to the other.
         end: the first end.
         numbers: of its own coordinates: bends and stretch.
-        bends: the values of these [m].
+        values: of these [m].
         speeds: their speeds [m/s].
     """
 
@@ -119,14 +119,14 @@ class PlacedRod(NamedTuple):
     frame: Frame
     end: Point
     numbers: list[int]
-    bends: list[Scalar]
+    values: list[Scalar]
     speeds: list[Scalar]
 
     def point(self, section: Section) -> Point:
         """Return the middle of a section."""
         if section.along == 0:
             return self.end
-        *bends, stretch = self.bends
+        *bends, stretch = self.values
         *bend_speeds, stretch_speed = self.speeds
         shortenings = [dot(row, bends) for row in section.shortening]
         ahead = section.along + section.stretch * stretch - 0.5 * dot(bends, shortenings)
@@ -237,7 +237,7 @@ class Placement:
             frame=frame._replace(axis=_rotate(frame.axis, rod.direction)),
             end=frame.point(*rod.start),
             numbers=chosen,
-            bends=[self.q[i] for i in chosen],
+            values=[self.q[i] for i in chosen],
             speeds=[self.qd[i] for i in chosen],
         )
 

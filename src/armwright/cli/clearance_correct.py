@@ -29,7 +29,10 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
         Path | None, Option(help="Output of `clearance estimate --json`: its mean error is corrected.")
     ] = None,
     knots: Annotated[int, Option(help="Number of points at which an entire path is corrected, at most 1000.")] = 20,
-    rounds: Annotated[int, Option(help="Number of iterations of the correction, at most 100.")] = 3,
+    rounds: Annotated[
+        int | None,
+        Option(help="Number of iterations, at most 100; by default 3 of pick-and-place and 5 of an entire path."),
+    ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     output: OutputFolder = None,
