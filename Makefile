@@ -98,7 +98,7 @@ site: $(VENV)/docs  ## Build the site from the pages and pictures that are there
 gallery: $(VENV)/docs  ## Run the commands of the gallery, those whose sources have changed, and write its page
 	$(BIN)/python docs/make_gallery.py
 
-studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones (a minute)
+studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones (some minutes)
 	$(BIN)/python docs/make_studies.py
 
 pictures: $(VENV)/docs  ## Draw the pictures of the physics pages, and take those of the tutorial on the studio
