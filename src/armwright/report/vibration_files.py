@@ -7,9 +7,15 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.dynamics.vibration import VibrationAssessment
+from armwright.kinematics.forward_kinematics import link_poses
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
+from armwright.report.mode_shapes import MovingLine, mode_drawing
 from armwright.report.static_page import static_page
+from armwright.report.stick_figure import skeleton_points
+
+# A step of the farthest joint, by which the displacement of a mode is taken [rad, m]; direction of view [rad].
+_STEP, _AZIMUTH, _ELEVATION = 1e-4, np.radians(-60.0), np.radians(20.0)
 
 
 def vibration_files(assessment: VibrationAssessment, *, command: str) -> dict[str, str]:
@@ -19,7 +25,8 @@ def vibration_files(assessment: VibrationAssessment, *, command: str) -> dict[st
         assessment: of the vibrations.
         command: the command line that made it.
     """
-    drawn = list(_drawings(assessment))
+    drawn, swinging = list(_drawings(assessment)), list(_swinging(assessment))
+    every = [*drawn, *swinging]
     beside = {"vibration.json": "frequencies, damping, shapes, compliance and deflection of every configuration"}
     return {
         "vibration.json": json.dumps(assessment.as_data(), indent=2, ensure_ascii=False) + "\n",
@@ -29,14 +36,19 @@ def vibration_files(assessment: VibrationAssessment, *, command: str) -> dict[st
             sections=[
                 Card("Vibrations and deflection", tables(assessment.tables())),
                 Card("Figures", figures(drawn)),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card(
+                    f"Mode shapes at configuration {assessment.numbers[assessment.softest]}",
+                    figures(swinging),
+                    "magnified",
+                ),
+                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in every})),
             ],
             numbers=_tiles(assessment),
             notes=assessment.notes,
             warnings=(),
             verdict=None,
         ),
-        **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
+        **{f"{drawing.name}.svg": drawing.svg for drawing in every},
     }
 
 
@@ -62,6 +74,25 @@ def _drawings(assessment: VibrationAssessment) -> Iterator[Drawing]:
             "deflection",
             "deflection of the tool along the motion",
             _along(assessment, lengths, "Deflection of the tool", "deflection, mm"),
+        )
+
+
+def _swinging(assessment: VibrationAssessment) -> Iterator[Drawing]:
+    """Give the modes of the softest configuration in motion, looked at from a little above."""
+    q, modes = assessment.q[assessment.softest], assessment.modes
+    frequencies, shapes = modes.frequencies[assessment.softest], modes.shapes[assessment.softest]
+    across = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
+    ahead = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
+    up = np.cos(_ELEVATION) * np.array([0.0, 0.0, 1.0]) - np.sin(_ELEVATION) * ahead
+    view = np.stack([across, up], axis=-1)
+    for i, (frequency, shape) in enumerate(zip(frequencies, shapes.T, strict=True)):
+        step = _STEP * shape / np.abs(shape).max()
+        behind, rest, before = skeleton_points(
+            assessment.arm, link_poses(assessment.arm, q + np.outer((-1, 0, 1), step))
+        )
+        shift = (before - behind) / (2 * _STEP)
+        yield mode_drawing(
+            f"mode-{i + 1}", f"Mode {i + 1}, {frequency:.2f} Hz", [MovingLine(rest @ view, shift @ view)]
         )
 
 

@@ -109,6 +109,7 @@ def assessed(five_bar: Linkage, means: dict[str, float], quantity: str, spread: 
             path=thesis_path(name),
             window=(0.05, 0.2),
             dwell=0.05,
+            sample=1e-5,
             force=pins,
             impacts=pins,
             flight=pins,

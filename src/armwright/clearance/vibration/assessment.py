@@ -192,7 +192,7 @@ class RattlingAssessment:
         first = self.rattlings[0]
         notes = [
             f"± is the standard deviation over {RUNS} runs whose clearances differ by at most a nanometre",
-            "accelerations of the tip are those beyond its path, means over a sample of 10 µs",
+            f"accelerations of the tip are those beyond its path, means over a sample of {first.sample * 1e6:.3g} µs",
         ]
         if first.dwell:
             notes.append(

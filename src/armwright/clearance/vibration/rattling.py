@@ -26,7 +26,7 @@ from armwright.errors import InvalidValueError
 
 # Indistinguishable runs, which fill a vector; and how long the tip is watched after the path [s].
 RUNS, DWELL = 16, 0.05
-# The time between samples [s]: accelerations are mean ones over this time, and no impact falls between two samples.
+# The time between samples, or the step where it is longer [s]: no impact falls between two samples.
 SAMPLE = 1e-5
 _LONGEST_DWELL = 1.0
 
@@ -40,6 +40,7 @@ class Rattling:
         window: start and end of the motion between its first and its last piece, those of speeding up and slowing down
             on the test paths [s].
         dwell: how long the drives were locked afterwards [s]; 0 for a path of the drives, which does not come to rest.
+        sample: time over which accelerations are averaged [s].
         motion_rms: (r,) root mean square of the acceleration of the tip in the window, beyond that of the path [m/s²].
         motion_peak: (r,) its largest magnitude [m/s²].
         dwell_rms: (r,) root mean square of the acceleration of the tip in the dwell [m/s²]; NaN without one.
@@ -54,6 +55,7 @@ class Rattling:
     path: Path
     window: tuple[float, float]
     dwell: float
+    sample: float
     motion_rms: Array
     motion_peak: Array
     dwell_rms: Array
@@ -126,6 +128,7 @@ def rattle(
         path=path,
         window=(start, end),
         dwell=0.0 if rest is None else dwell,
+        sample=scenario.stride * scenario.h,
         motion_rms=_rms(moving[:, inside]),
         motion_peak=moving[:, inside].max(axis=-1),
         dwell_rms=_rms(still),
