@@ -260,8 +260,9 @@ def _broadcast_parameters(
             raise InvalidValueError(f"{name}: expected {bound}, got {values.min():g}")
         if np.any(values > high):
             raise InvalidValueError(f"{name}: expected none above {high:g}, got {values.max():g}")
-    text = " and ".join(["clearances", *(name for name, value in others.items() if value is not None)])
-    lead = leading_axes(text, [c, *numbers], [c.shape[:-1], *(values.shape for values in numbers)])
+    given = [(name, values) for name, values in zip(others, numbers, strict=True) if others[name] is not None]
+    text, arrays = " and ".join(["clearances", *(name for name, _ in given)]), [values for _, values in given]
+    lead = leading_axes(text, [c, *arrays], [c.shape[:-1], *(values.shape for values in arrays)])
     return np.broadcast_to(c, (*lead, c.shape[-1])), [np.broadcast_to(values, lead) for values in numbers]
 
 
