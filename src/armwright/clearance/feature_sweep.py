@@ -195,7 +195,7 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     return swept == own
 
 
-def _simulate_outputs(task: Scenario, clearances: Array, free: Mapping[str, Array]) -> _RunOutputs:
+def _simulate_outputs(task: Scenario, clearances: Array, free: Mapping[str, Any]) -> _RunOutputs:
     """Simulate (m, p) clearances [m] with free parameters (m,) each and return the outputs of the sweep."""
     # One core: the sweep occupies the others.
     run = simulate(task, clearances, threads=1, **free)

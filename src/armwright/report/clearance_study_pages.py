@@ -62,9 +62,9 @@ def _estimate_tiles(assessment: EstimateAssessment) -> Iterator[Tile]:
         low, high = it["interval"]
         if name in FREE_PARAMETERS:
             unit = FREE_PARAMETERS[name].unit.replace("1", "")
-            between = f"90 % from {low:.3f} to {high:.3f} {unit}".rstrip()
+            between = f"90 % from {low:.4f} to {high:.4f} {unit}".rstrip()
             text = between if it["identifiable"] else "not identifiable"
-            yield Tile(f"{it['mean']:.3f} {unit}".rstrip(), f"{name.replace('_', ' ')}, {text}", mark=_mark(it))
+            yield Tile(f"{it['mean']:.4f} {unit}".rstrip(), f"{name.replace('_', ' ')}, {text}", mark=_mark(it))
         else:
             between = f"90 % from {low * 1e3:.3f} to {high * 1e3:.3f} mm"
             text = between if it["identifiable"] else "not identifiable"

@@ -220,21 +220,15 @@ def assess_paths(
         *_predictability_notes(sweep),
         *_fit_notes(distribution.misfit, distribution.widening),
     ]
-    for name, end in distribution.bounds.items():
-        notes.append(
-            f"{name.removeprefix('c_')} is at or beyond the end of the swept range, {parameter_text(name, end)}: it is "
-            f"not identifiable; sweep a larger range"
-        )
-    unknown = [
-        name.removeprefix("c_")
-        for name, known in distribution.identifiable.items()
-        if not known and name not in distribution.bounds
-    ]
-    if unknown:
-        notes.append(
-            f"{', '.join(unknown)}: not identifiable, since these paths hardly depend on it; what is printed is the "
-            f"swept range rather than a measurement"
-        )
+    for name in distribution.names:
+        pin, end = name.removeprefix("c_"), distribution.bounds.get(name)
+        if name not in distribution.narrowed:
+            notes.append(f"{pin} is not identifiable: these paths hardly depend on it within its swept range")
+        elif end is not None:
+            notes.append(
+                f"{pin} is at or beyond the end of the swept range, {parameter_text(name, end)}: it is not "
+                f"identifiable; sweep a larger range"
+            )
     return EstimateAssessment(
         method="paths",
         parameters=_parameters(distribution, distribution.mean, distribution.identifiable),

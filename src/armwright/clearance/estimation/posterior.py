@@ -101,9 +101,14 @@ class Posterior:
 
         A bound narrows the distribution of a parameter beyond it.
         """
+        return {name: name in self.narrowed and name not in self.bounds for name in self.names}
+
+    @property
+    def narrowed(self) -> tuple[str, ...]:
+        """The parameters that are known much better than by the prior."""
         prior = (self.upper - self.lower) / np.sqrt(12)
         is_narrow = self.deviations <= _MAX_PRIOR_PART * prior
-        return {name: bool(x) and name not in self.bounds for name, x in zip(self.names, is_narrow, strict=True)}
+        return tuple(name for name, x in zip(self.names, is_narrow, strict=True) if x)
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (k, 2) the central interval in which each parameter lies with the probability ``level``."""
