@@ -32,6 +32,15 @@ from armwright.tracing.native import function_address
 # A tip farther from its path than this has diverged [m].
 _DIVERGED = 1.0
 
+# What parameters of runs beside the clearances may be: above or from the lower end, up to the upper one.
+_RANGES: Mapping[str, tuple[float, float]] = {
+    "frictions": (0.0, math.inf),
+    "restitutions": (0.0, 1.0),
+    "payloads": (0.0, math.inf),
+    "torque_scales": (0.0, math.inf),
+}
+_ABOVE = {"restitutions", "torque_scales"}
+
 
 class Status(IntEnum):
     """How a run ended."""
@@ -178,7 +187,8 @@ def simulate(
         )
     start[..., : layout.n] = of_shape(initial[0], (layout.n,), "initial coordinates")
     start[..., layout.n : 2 * layout.n] = of_shape(initial[1], (layout.n,), "initial speeds")
-    chi = np.array([damping(settings.impact, x) for x in e.ravel()]).reshape(*lead, 1)
+    different, number = np.unique(e, return_inverse=True)
+    chi = np.array([damping(settings.impact, x) for x in different])[number].reshape(*lead, 1)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
     controllers = len(linkage.drives) if settings.control == "pd+ff" else 0
@@ -220,16 +230,6 @@ def initial_coordinates(
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
     elastic = None if scenario.settings.start == "rigid" else K
     return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic, worn, payload=payloads).q
-
-
-# What parameters of runs beside the clearances may be: above or from the lower end, up to the upper one.
-_RANGES: Mapping[str, tuple[float, float]] = {
-    "frictions": (0.0, math.inf),
-    "restitutions": (0.0, 1.0),
-    "payloads": (0.0, math.inf),
-    "torque_scales": (0.0, math.inf),
-}
-_ABOVE = {"restitutions", "torque_scales"}
 
 
 def initial_speeds(scenario: Scenario) -> Array:
