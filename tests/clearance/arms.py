@@ -36,7 +36,7 @@ def varied(task: FeatureSweep, **changes: Any) -> FeatureSweep:
 
     Args:
         task: the first one.
-        changes: fields that the prepared paths do not depend on, such as ``replicates`` and ``with_friction``.
+        changes: fields that the prepared paths do not depend on, such as ``replicates`` and ``free``.
     """
     other = attrs.evolve(task, **changes)
     vars(other)["tasks"] = task.tasks

@@ -16,6 +16,7 @@ from armwright.clearance.paths import named_path
 from armwright.clearance.predictability import MAX_DISTANCE, perturb_clearances
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare_scenario
+from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.sweep.designs import Design, latin_hypercube
@@ -99,7 +100,7 @@ def test_chance_that_is_left_in_means(rng: np.random.Generator) -> None:
 
 def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
     """With friction as a parameter, its usual value gives the usual row, and another one another row."""
-    with_friction = varied(task, with_friction=True)
+    with_friction = varied(task, free=("friction",))
     usual = five_bar.material.friction
 
     rows = with_friction(np.array([[*ARM_A, usual], [*ARM_A, 0.0]]))
@@ -108,6 +109,27 @@ def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
     assert rows["y1_intercept"][0] == task(ARM_A[None])["y1_intercept"][0]
     # By 0.07 to 0.10 mm between 0.05 and none (spec of the clearance, 4.4).
     assert 0.02e-3 < abs(rows["y1_intercept"][1] - rows["y1_intercept"][0]) < 0.15e-3
+
+
+def test_free_parameters(five_bar: Linkage) -> None:
+    """Restitution, payload and scale of the efforts follow the clearances; what sweeps of friction wrote stays so."""
+    settings = Settings(step=2e-5, sample=5e-4)
+    task = FeatureSweep(linkage=five_bar, paths=("y1",), simulation_settings=settings, replicates=0)
+    free = varied(task, free=("payload", "restitution", "torque_scale"))
+    material = five_bar.material
+
+    rows = free(np.array([[*ARM_A, 0.0, material.restitution, 1.0], [*ARM_A, 0.05, material.restitution, 1.0]]))
+
+    usual = task(ARM_A[None])["y1_intercept"][0]
+    assert free.parameters == ("c_J2", "c_J3", "c_J4", "payload", "restitution", "torque_scale")
+    assert rows["y1_intercept"][0] == pytest.approx(usual, rel=1e-9)
+    assert abs(rows["y1_intercept"][1] / usual - 1) > 0.1
+    assert free.settings["free"] == ["payload", "restitution", "torque_scale"]
+    assert "free" not in varied(task, free=("friction",)).settings
+    with pytest.raises(UnknownNameError, match=r"no free parameter 'payloads'\. Did you mean 'payload'"):
+        varied(task, free=("payloads",))
+    with pytest.raises(InvalidValueError, match="free parameters: 'payload' occurs twice"):
+        varied(task, free=("payload", "payload"))
 
 
 def test_outputs_are_those_announced(task: FeatureSweep) -> None:
@@ -174,7 +196,7 @@ def test_same_bits_whoever_simulates(task: FeatureSweep, tmp_path: Path) -> None
 def test_diverging_run(task: FeatureSweep, tmp_path: Path) -> None:
     """A run that diverges is a row that says so; those beside it keep their bits, and the sweep goes on."""
     pytest.importorskip("xarray")
-    with_friction = varied(task, with_friction=True)
+    with_friction = varied(task, free=("friction",))
     well = np.array([[*ARM_A, 0.05], [*ARM_B, 0.05], [*ARM_A, 0.0]])
     points = np.insert(well, 1, [*ARM_B, STUCK], axis=0)
 

@@ -6,10 +6,12 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from armwright.clearance import simulation
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.contact import stiffness
+from armwright.clearance.energy_balance import energy_balance
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.paths import constant_speed_path, thesis_path
@@ -18,6 +20,7 @@ from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import InvalidValueError, ShapeError
+from clearance.arms import beginning
 from clearance.mechanisms import block, imbalance, left_alone, pendulum, still, thrown
 
 # The issue asks for the converged values of y1 to this [m].
@@ -202,6 +205,32 @@ class TestManyAtOnce:
         assert simulate(y1, np.zeros((0, 3)) + 1e-4).tip.shape == (0, 251, 2)
 
 
+def test_runs_with_other_restitution_payload_and_efforts(five_bar: Linkage) -> None:
+    """A run is that of a linkage of such material, with such a mass in its rod, and of such efforts of its drives."""
+    task = prepare_scenario(five_bar, beginning(thesis_path("y1"), 0.1), Settings(step=2e-5, sample=1e-3))
+    rod, mass = five_bar.body("link3"), 0.15
+    end = rod.points["J3"][0]
+    total = rod.mass + mass
+    centre = (rod.mass * rod.centre[0] + mass * end) / total
+    inertia = rod.inertia + rod.mass * (centre - rod.centre[0]) ** 2 + mass * (end - centre) ** 2
+    heavier = attrs.evolve(rod, mass=total, inertia=inertia, centre=(centre, 0.0))
+    others = attrs.evolve(
+        five_bar,
+        bodies=[heavier if body.name == "link3" else body for body in five_bar.bodies],
+        material=attrs.evolve(five_bar.material, restitution=0.6),
+    )
+
+    runs = simulate(task, restitutions=[0.9, 0.6], payloads=[0.0, mass], torque_scales=[1.0, 1.02])
+
+    plain = simulate(task)
+    other = simulate(attrs.evolve(task, linkage=others, table=1.02 * task.table))
+    # Coordinates of the rod are those of its own centre.
+    np.testing.assert_allclose(runs.tip[0], plain.tip, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(runs.tip[1], other.tip, rtol=0, atol=1e-10)
+    assert np.abs(runs.tip[1] - runs.tip[0]).max() > 1e-3
+    assert np.abs(energy_balance(runs).imbalance).max() < LEAK
+
+
 def test_samples() -> None:
     """Samples come at the multiples of their time, from the start to the end, whatever the step."""
     task = thrown(block(), Settings(step=1e-5, sample=2.5e-4, start="centred"), 0.01, (0.01, 0.02))
@@ -278,6 +307,27 @@ class TestRefused:
         """Friction does not push."""
         with pytest.raises(InvalidValueError, match=r"frictions: expected none below 0, got -0\.1"):
             simulate(y1, frictions=-0.1)
+
+    @pytest.mark.parametrize(
+        ("numbers", "said"),
+        [
+            ({"restitutions": 0.0}, "restitutions: expected above 0, got 0"),
+            ({"restitutions": [0.5, 1.5]}, r"restitutions: expected none above 1, got 1\.5"),
+            ({"payloads": -0.1}, r"payloads: expected none below 0, got -0\.1"),
+            ({"torque_scales": 0.0}, "torque_scales: expected above 0, got 0"),
+        ],
+    )
+    def test_parameters_out_of_range(self, y1: Scenario, numbers: dict[str, ArrayLike], said: str) -> None:
+        """What no linkage has is refused."""
+        with pytest.raises(InvalidValueError, match=said):
+            simulate(y1, **numbers)
+
+    def test_scale_of_prescribed_motion(self) -> None:
+        """Drives that follow a motion have no efforts to scale."""
+        crank = load_linkage("slider-crank")
+        turning = prepare_scenario(crank, constant_speed_path("round", 0.0, 1.0, 0.1))
+        with pytest.raises(InvalidValueError, match="torque_scales: expected drives by effort"):
+            simulate(turning, torque_scales=1.1)
 
     def test_step(self, five_bar: Linkage) -> None:
         """A step that cannot follow the contacts is refused before the run."""

@@ -170,6 +170,8 @@ MISTAKES = [
     (("sweep", "five-bar", "--step", "1e-3"), "step: 0.001 s is too long for contacts of "),
     (("sweep", "five-bar", "--paths", "y1", "--step", "4.6e-5"), "is too long for contacts"),
     (("sweep", "five-bar", "--replicates", "16"), "replicates: expected 0 to 15, got 16"),
+    (("sweep", "five-bar", "--vary", "payloads=0:0.2"), "no free parameter 'payloads'. Did you mean 'payload'?"),
+    (("sweep", "five-bar", "--vary", "friction=0:0.1", "--to-friction", "0.1"), "expected it or --vary friction"),
     (("sweep", "four-bar"), "four-bar: with its pins closed it has 1 freedom"),
     (("sweep", "five-bra"), "no linkage 'five-bra'. Did you mean 'five-bar'?"),
 ]  # fmt: skip

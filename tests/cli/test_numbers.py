@@ -3,7 +3,7 @@
 import pytest
 import typer
 
-from armwright.cli.numbers import named_numbers, numbers, within
+from armwright.cli.numbers import named_numbers, named_ranges, numbers, within
 
 
 def test_named_numbers() -> None:
@@ -54,3 +54,26 @@ def test_lists_of_numbers() -> None:
     assert numbers("1, 2.5 -3", 3, "-q") == [1.0, 2.5, -3.0]
     with pytest.raises(typer.BadParameter, match="expected 2 finite numbers, got 3"):
         numbers("1,2,3", 2, "-q")
+
+
+def test_named_ranges() -> None:
+    """Ranges have a name and two numbers, the second above the first; each name occurs once."""
+    assert named_ranges(["payload=0:0.2", "torque_scale = .98:1.02"], "--vary") == {
+        "payload": (0.0, 0.2),
+        "torque_scale": (0.98, 1.02),
+    }
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (["payload=0.2"], "expected a name and a range such as payload=0:0.2, got payload=0.2"),
+        (["payload=0:1e999"], "every number must be finite"),
+        (["payload=0.2:0.1"], "payload: expected a range whose second number is larger, got 0.2:0.1"),
+        (["payload=0:1", "payload=0:2"], "payload occurs twice"),
+    ],
+)
+def test_malformed_named_ranges(texts: list[str], said: str) -> None:
+    """Anything else is refused with what was expected."""
+    with pytest.raises(typer.BadParameter, match=said):
+        named_ranges(texts, "--vary")

@@ -52,10 +52,11 @@ def energy_balance(simulation: Simulation) -> EnergyBalance:
     q, qd = ([x[..., i] for i in range(x.shape[-1])] for x in (simulation.q, simulation.qd))
     placement = Placement(linkage, q, qd)
     depths = np.maximum(simulation.depths, 0.0)
-    potential = np.asarray(potential_energy(placement))
+    payload = None if simulation.payloads is None else simulation.payloads[..., None]
+    potential = np.asarray(potential_energy(placement, payload))
     return EnergyBalance(
         driven=simulation.works["driven"],
-        kinetic=np.asarray(kinetic_energy(placement)),
+        kinetic=np.asarray(kinetic_energy(placement, payload)),
         potential=potential - potential[..., :1],
         stored=np.asarray((0.4 * simulation.stiffness[..., None, :] * depths**2.5).sum(axis=-1)),
         impact_loss=simulation.works["impact loss"],

@@ -22,7 +22,7 @@ from armwright.clearance.contact import (
     smooth_slip,
 )
 from armwright.clearance.linkage import GROUND, ClearancePin, Coordinate, Linkage
-from armwright.clearance.placement import Placement, Vec2
+from armwright.clearance.placement import Placement, Point, Vec2
 from armwright.tracing.scalar import Scalar, atan2, select, sqrt
 
 SlipSpeed: TypeAlias = Literal["surface", "centre"]
@@ -164,6 +164,7 @@ def rates(
     contacts: Sequence[Contact],
     *,
     walls: Sequence[Wall] | None = None,
+    payload: Scalar | None = None,
 ) -> Rates:
     """Return the accelerations, efforts, powers and energies of a linkage with clearance.
 
@@ -174,9 +175,10 @@ def rates(
         drives: of each drive its effort [N m, N], or its acceleration where its motion is prescribed.
         contacts: parameters of the contact law of each pin.
         walls: of each pin, where they are worn.
+        payload: mass at the tip, beside the loads of the linkage [kg].
     """
     placement = Placement(linkage, state.q, state.qd)
-    force = free_forces(placement)
+    force = free_forces(placement, payload)
     pins, impact_loss, friction_loss, stored = [], 0.0, 0.0, 0.0
     for i, parameters in enumerate(zip(linkage.pins, contacts, state.memories, strict=True)):
         pin = _pin_contact(placement, friction, *parameters, worn=walls[i] if walls else None)
@@ -186,7 +188,7 @@ def rates(
         impact_loss = impact_loss + pin.losses[0]
         friction_loss = friction_loss + pin.losses[1]
         stored = stored + pin.stored
-    qdd, efforts = _accelerations(placement, mass_matrix(placement), force, drives)
+    qdd, efforts = _accelerations(placement, mass_matrix(placement, payload), force, drives)
     driven = 0.0
     for drive, effort in zip(linkage.drives, efforts, strict=True):
         for i, weight in drive_weights(linkage, drive.body).items():
@@ -194,15 +196,16 @@ def rates(
     powers = [driven, impact_loss, friction_loss]
     if placement.rods:
         powers.append(sum((c * state.qd[i] * state.qd[i] for i, _, c in rod_springs(placement)), 0.0))
-    energy = [kinetic_energy(placement), potential_energy(placement), stored + strain_energy(placement)]
+    energy = [kinetic_energy(placement, payload), potential_energy(placement, payload)]
+    energy.append(stored + strain_energy(placement))
     return Rates(qdd, efforts, powers, pins, energy)
 
 
 # ---- bodies --------------------------------------------------------------------------------------------------------
 
 
-def free_forces(placement: Placement) -> list[Scalar]:
-    """Return the generalised forces of gravity, loads, speeds and rods, without drives and contacts."""
+def free_forces(placement: Placement, payload: Scalar | None = None) -> list[Scalar]:
+    """Return the generalised forces of gravity, loads, payload, speeds and rods, without drives and contacts."""
     linkage = placement.linkage
     force: list[Scalar] = [0.0] * len(placement.q)
     gravity = Vec2(*map(float, linkage.gravity))
@@ -217,39 +220,54 @@ def free_forces(placement: Placement) -> list[Scalar]:
             force[i] += partial.dot(push)
     for i, k, c in rod_springs(placement):
         force[i] = force[i] - k * placement.q[i] - c * placement.qd[i]
+    if payload is not None:
+        tip = placement.point(linkage.tip)
+        push = gravity.minus(tip.bias).times(payload)
+        for i, partial in tip.partials.items():
+            force[i] = force[i] + partial.dot(push)
     return force
 
 
-def mass_matrix(placement: Placement) -> dict[tuple[int, int], Scalar]:
+def mass_matrix(placement: Placement, payload: Scalar | None = None) -> dict[tuple[int, int], Scalar]:
     """Return the entries on and below the diagonal of the mass matrix, but for those that are always 0."""
     entries: dict[tuple[int, int], Scalar] = {}
     for body in placement.linkage.bodies:
         inertia, rotations = placement.inertia(body), placement.frames[body.name].angle_partials
         for mass, point in placement.masses(body):
-            for i, partial in point.partials.items():
-                for j, other in point.partials.items():
-                    if i >= j:
-                        entries[i, j] = entries.get((i, j), 0.0) + mass * partial.dot(other)
+            _add_mass(entries, mass, point)
         for i, weight in rotations.items():
             for j, other_weight in rotations.items():
                 if i >= j:
                     entries[i, j] = entries.get((i, j), 0.0) + inertia * weight * other_weight
+    if payload is not None:
+        _add_mass(entries, payload, placement.point(placement.linkage.tip))
     return {index: entry for index, entry in entries.items() if not (isinstance(entry, float) and entry == 0)}
 
 
-def kinetic_energy(placement: Placement) -> Scalar:
-    """Return the kinetic energy of all bodies [J]."""
+def _add_mass(entries: dict[tuple[int, int], Scalar], mass: Scalar, point: Point) -> None:
+    """Add a mass at a point to the mass matrix."""
+    for i, partial in point.partials.items():
+        for j, other in point.partials.items():
+            if i >= j:
+                entries[i, j] = entries.get((i, j), 0.0) + mass * partial.dot(other)
+
+
+def kinetic_energy(placement: Placement, payload: Scalar | None = None) -> Scalar:
+    """Return the kinetic energy of all bodies and of a payload at the tip [J]."""
     energy = 0.0
     for body in placement.linkage.bodies:
         spin = placement.frames[body.name].spin
         for mass, point in placement.masses(body):
             energy = energy + 0.5 * mass * point.velocity.dot(point.velocity)
         energy = energy + 0.5 * placement.inertia(body) * spin * spin
+    if payload is not None:
+        velocity = placement.point(placement.linkage.tip).velocity
+        energy = energy + 0.5 * payload * velocity.dot(velocity)
     return energy
 
 
-def potential_energy(placement: Placement) -> Scalar:
-    """Return the energy of gravity and of the constant loads [J]."""
+def potential_energy(placement: Placement, payload: Scalar | None = None) -> Scalar:
+    """Return the energy of gravity, of the constant loads and of a payload at the tip [J]."""
     linkage, energy = placement.linkage, 0.0
     gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
@@ -257,6 +275,8 @@ def potential_energy(placement: Placement) -> Scalar:
             energy = energy - mass * gravity.dot(point.position)
     for load in linkage.loads:
         energy = energy - Vec2(*map(float, load.force)).dot(placement.point(load.point).position)
+    if payload is not None:
+        energy = energy - payload * gravity.dot(placement.point(linkage.tip).position)
     return energy
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from armwright.arrays import Array, Flags, integer
 from armwright.clearance.features import simulation_features
+from armwright.clearance.free_parameters import FREE_PARAMETERS
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.predictability import MAX_DISTANCE, MAX_REPLICATES, last_time_together, perturb_clearances
@@ -51,31 +52,34 @@ class _RunOutputs(NamedTuple):
 class FeatureSweep:
     """The features of linkages with given clearances, on several paths.
 
-    A point has one clearance for each pin, in its order, and with ``with_friction`` the coefficient of friction after
-    them.
+    A point has one clearance for each pin, in its order, and the free parameters after them.
 
     Attributes:
         linkage: that moves.
         paths: names of test paths, each once; the features describe their straight part.
         simulation_settings: of each run.
-        with_friction: whether a point has a coefficient of friction too.
+        free: names of the free parameters, each once.
         replicates: repetitions of each run, with clearances a nanometre away at most. With none there is no spread.
     """
 
     linkage: Linkage
     paths: tuple[str, ...]
     simulation_settings: Settings = attrs.field(factory=Settings)
-    with_friction: bool = False
+    free: tuple[str, ...] = ()
     replicates: int = DEFAULT_REPLICATES
 
     def __attrs_post_init__(self) -> None:
-        """Refuse unknown and repeated paths, and more replicates than fill a vector."""
+        """Refuse unknown and repeated paths and parameters, and more replicates than fill a vector."""
         if integer(self.replicates, "replicates", least=0) > MAX_REPLICATES:
             raise InvalidValueError(f"replicates: expected 0 to {MAX_REPLICATES}, got {self.replicates}")
         for path in self.paths:
             one_of("test path", path, TEST_PATHS)
             if self.paths.count(path) > 1:
                 raise InvalidValueError(f"paths: '{path}' occurs twice")
+        for name in self.free:
+            one_of("free parameter", name, FREE_PARAMETERS)
+            if self.free.count(name) > 1:
+                raise InvalidValueError(f"free parameters: '{name}' occurs twice")
         if not self.paths:
             raise InvalidValueError("paths: expected one or more, got none")
 
@@ -87,18 +91,19 @@ class FeatureSweep:
     @property
     def parameters(self) -> tuple[str, ...]:
         """The names of the numbers of a point."""
-        names = tuple(f"c_{pin}" for pin in self.linkage.clearances)
-        return (*names, "friction") if self.with_friction else names
+        return (*(f"c_{pin}" for pin in self.linkage.clearances), *self.free)
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """The other inputs of the results."""
+        """The other inputs of the results; folders of before other parameters than friction were free stay the same."""
+        others = [name for name in self.free if name != "friction"]
         return {
             "linkage": self.linkage.as_data(),
             "paths": list(self.paths),
             "simulation": attrs.asdict(self.simulation_settings),
-            "with_friction": self.with_friction,
+            "with_friction": "friction" in self.free,
             "replicates": self.replicates,
+            **({"free": others} if others else {}),
         }
 
     @property
@@ -132,12 +137,12 @@ class FeatureSweep:
     def __call__(self, points: Array) -> dict[str, Any]:
         """Return the outputs at (m, k) points, and which runs diverged."""
         pins = len(self.linkage.pins)
-        frictions = points[:, pins] if self.with_friction else None
+        free = {FREE_PARAMETERS[name].argument: points[:, pins + k] for k, name in enumerate(self.free)}
         rows = perturb_clearances(points[:, :pins], self.replicates)
         outputs: dict[str, Any] = {}
         diverged = np.zeros(len(points), dtype=bool)
         for path, task in zip(self.paths, self.tasks, strict=True):
-            runs = [_simulate_outputs(task, row, frictions) for row in rows]
+            runs = [_simulate_outputs(task, row, free) for row in rows]
             diverged |= np.any([run.diverged for run in runs], axis=0)
             for name in _QUANTITIES:
                 # The runs of a point are adjacent in memory: their sums then round alike, whatever the other points.
@@ -190,9 +195,9 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     return swept == own
 
 
-def _simulate_outputs(task: Scenario, clearances: Array, frictions: Array | None) -> _RunOutputs:
-    """Simulate (m, p) clearances [m] and return the outputs of the sweep."""
+def _simulate_outputs(task: Scenario, clearances: Array, free: Mapping[str, Any]) -> _RunOutputs:
+    """Simulate (m, p) clearances [m] with free parameters (m,) each and return the outputs of the sweep."""
     # One core: the sweep occupies the others.
-    run = simulate(task, clearances, frictions=frictions, threads=1)
+    run = simulate(task, clearances, threads=1, **free)
     values = {**simulation_features(run)._asdict(), "peak": run.peaks.max(axis=-1)}
     return _RunOutputs(values, run.time, run.error, np.asarray(run.status != Status.FINISHED))

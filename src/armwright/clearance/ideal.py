@@ -150,7 +150,9 @@ def _block_motion(
     return q, qd, qdd, efforts, reactions
 
 
-def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
+def inverse_dynamics(
+    linkage: Linkage, q: Array, qd: Array, qdd: Array, payload: Array | None = None
+) -> tuple[Array, Array]:
     """Return the efforts and reactions that belong to a motion.
 
     Args:
@@ -158,6 +160,7 @@ def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple
         q: (..., n) coordinates; the journals may be eccentric in their bearings.
         qd: (..., n) speeds.
         qdd: (..., n) accelerations.
+        payload: (...) masses at the tip [kg].
 
     Returns:
         (..., d) efforts [N m, N], and (..., p, 2) the force on each bearing, in its middle [N].
@@ -172,8 +175,8 @@ def inverse_dynamics(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple
         )
     lead = q.shape[:-1]
     moving = place_bodies(linkage, q, qd)
-    need = -stack(lead, free_forces(moving))
-    for (i, j), entry in mass_matrix(moving).items():
+    need = -stack(lead, free_forces(moving, payload))
+    for (i, j), entry in mass_matrix(moving, payload).items():
         need[..., i] += entry * qdd[..., j]
         if i != j:
             need[..., j] += entry * qdd[..., i]

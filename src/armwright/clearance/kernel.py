@@ -59,6 +59,24 @@ def _kernel_key(linkage: Linkage) -> str:
     return json.dumps(attrs.evolve(linkage, name="", pins=pins, material=Material(), assembly={}).as_data())
 
 
+class Inputs(NamedTuple):
+    """What the equations of a linkage take.
+
+    Attributes:
+        state: of the linkage.
+        drives: effort of each drive, or its acceleration where its motion is prescribed.
+        contacts: parameters of the contact law of each pin.
+        walls: of each pin; empty where they are round.
+        payload: mass at the tip [kg]; None without one.
+    """
+
+    state: State
+    drives: list[Scalar]
+    contacts: list[Contact]
+    walls: list[Wall]
+    payload: Scalar | None
+
+
 @attrs.frozen(kw_only=True)
 class Layout:
     """The layout of the numbers of a simulation; two are equal where their kernels are.
@@ -69,6 +87,7 @@ class Layout:
         control: of the drives.
         located: whether impacts are located within a step; see ``event_location``.
         worn: whether the walls of the pins are worn; see ``worn_walls``.
+        loaded: whether each run has a payload at the tip and a scale of its efforts.
     """
 
     linkage: Linkage = attrs.field(eq=_kernel_key)
@@ -76,6 +95,7 @@ class Layout:
     control: Control
     located: bool = False
     worn: bool = False
+    loaded: bool = False
 
     @property
     def n(self) -> int:
@@ -109,8 +129,8 @@ class Layout:
 
     @property
     def gains(self) -> int:
-        """The number of controller gains: stiffness and damping of each drive."""
-        return 2 * len(self.linkage.drives) if self.control == "pd+ff" else 0
+        """The number of controller gains, stiffness and damping of each drive, then payload and scale of efforts."""
+        return (2 * len(self.linkage.drives) if self.control == "pd+ff" else 0) + (2 if self.loaded else 0)
 
     @property
     def sampled(self) -> int:
@@ -122,8 +142,8 @@ class Layout:
         """The length of what is looked up of worn walls."""
         return len(Wall._fields) * self.pins if self.worn else 0
 
-    def unpack(self, x: Sequence[Scalar]) -> tuple[State, list[Scalar], list[Contact], list[Wall]]:
-        """Return state, drives, contacts and worn walls of a row of numbers."""
+    def unpack(self, x: Sequence[Scalar]) -> Inputs:
+        """Return what a row of numbers means."""
         numbers = iter(x)
 
         def take(count: int) -> list[Scalar]:
@@ -137,7 +157,12 @@ class Layout:
         gains, columns, looked_up = take(self.gains), take(self.columns), take(self.wall_numbers)
         walls = [Wall(*looked_up[i : i + 3]) for i in range(0, len(looked_up), 3)]
         memories = [ContactMemory(*pair, bend) for pair, bend in zip(impacts, deflections, strict=True)]
-        return State(q, qd, memories), self._drives(q, qd, gains, columns), contacts, walls
+        payload, scale = gains[-2:] if self.loaded else (None, None)
+        drives = self._drives(q, qd, gains, columns)
+        if scale is not None:
+            kinds = [drive.kind for drive in self.linkage.drives]
+            drives = [x * scale if kind == "effort" else x for x, kind in zip(drives, kinds, strict=True)]
+        return Inputs(State(q, qd, memories), drives, contacts, walls, payload)
 
     def _drives(
         self, q: Sequence[Scalar], qd: Sequence[Scalar], gains: Sequence[Scalar], columns: Sequence[Scalar]
@@ -153,8 +178,8 @@ class Layout:
 
     def rates(self, x: Sequence[Scalar]) -> list[Scalar]:
         """Return the rates of the state, memory and force of each pin, and, where located, depths and their rates."""
-        state, drives, contacts, walls = self.unpack(x)
-        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts, walls=walls)
+        state, drives, contacts, walls, payload = self.unpack(x)
+        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts, walls=walls, payload=payload)
         pins = linkage_rates.pins
         bristles = [pin.deflection_rate for pin in pins][: self.deflections]
         impacts = [x for pin in pins for x in (pin.memory.touching, pin.memory.speed, pin.normal)]
@@ -163,7 +188,7 @@ class Layout:
 
     def places(self, x: Sequence[Scalar]) -> list[Scalar]:
         """Return of each pin the direction of its gap and the rotation of its journal [rad]."""
-        state = self.unpack(x)[0]
+        state = self.unpack(x).state
         placement = Placement(self.linkage, state.q, state.qd)
         return [angle for pin in self.linkage.pins for angle in pin_place(placement, pin)]
 

@@ -96,8 +96,10 @@ def simulate_with_predictability(
 def select_run(simulation: Simulation, number: int) -> Simulation:
     """Return one run of several side by side."""
     names = ("clearances", "frictions", "q", "qd", "tip", "error", "forces", "impacts", "peaks", "status")
+    payloads = None if simulation.payloads is None else simulation.payloads[number]
     return attrs.evolve(
         simulation,
+        payloads=payloads,
         works={name: work[number] for name, work in simulation.works.items()},
         **{name: getattr(simulation, name)[number] for name in names},
     )

@@ -5,6 +5,7 @@ The drives give what a linkage without clearance would need for the path; the de
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache
@@ -30,6 +31,15 @@ from armwright.tracing.native import function_address
 
 # A tip farther from its path than this has diverged [m].
 _DIVERGED = 1.0
+
+# What parameters of runs beside the clearances may be: above or from the lower end, up to the upper one.
+_RANGES: Mapping[str, tuple[float, float]] = {
+    "frictions": (0.0, math.inf),
+    "restitutions": (0.0, 1.0),
+    "payloads": (0.0, math.inf),
+    "torque_scales": (0.0, math.inf),
+}
+_ABOVE = {"restitutions", "torque_scales"}
 
 
 class Status(IntEnum):
@@ -59,6 +69,7 @@ class Simulation:
         peaks: (..., p) the largest force in each pin [N].
         status: (...) how each run ended.
         worn: the walls of its pins; None where they are round.
+        payloads: (...) masses at the tip, beside the loads of the linkage [kg]; None without any.
     """
 
     scenario: Scenario
@@ -75,6 +86,7 @@ class Simulation:
     peaks: Array
     status: Integers
     worn: WornWalls | None = None
+    payloads: Array | None = None
 
     @property
     def distance(self) -> Array:
@@ -120,6 +132,9 @@ def simulate(
     *,
     frictions: ArrayLike | None = None,
     initial: tuple[ArrayLike, ArrayLike] | None = None,
+    restitutions: ArrayLike | None = None,
+    payloads: ArrayLike | None = None,
+    torque_scales: ArrayLike | None = None,
     threads: int | None = None,
     worn: WornWalls | None = None,
 ) -> Simulation:
@@ -130,15 +145,29 @@ def simulate(
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
         initial: (..., n) coordinates and speeds from which the runs start; when left out, those of the settings.
+        restitutions: (...) of impacts; that of the material when left out.
+        payloads: (...) masses at the tip, unknown to the drives, beside the loads of the linkage [kg].
+        torque_scales: (...) by which drives yield more than the efforts asked of them.
         threads: how many cores to use; all when left out. The bits do not depend on it.
         worn: walls of pins of these clearances, where they are worn.
 
     Raises:
-        InvalidValueError: a clearance is not above 0, or the step is too long for the contacts.
+        InvalidValueError: a clearance is not above 0, another number is out of its range, or the step is too long for
+            the contacts.
         ShapeError: the clearances are not one per pin, or the leading axes do not fit.
     """
     linkage, settings = scenario.linkage, scenario.settings
-    c, mu = _broadcast_parameters(linkage, clearances, frictions)
+    loaded = payloads is not None or torque_scales is not None
+    if torque_scales is not None and all(drive.kind == "motion" for drive in linkage.drives):
+        raise InvalidValueError(f"torque_scales: expected drives by effort; those of {linkage.name} follow a motion")
+    c, (mu, e, mass, scale) = _broadcast_parameters(
+        linkage,
+        clearances,
+        frictions=frictions,
+        restitutions=restitutions,
+        payloads=payloads,
+        torque_scales=torque_scales,
+    )
     lead = mu.shape
     K = contact_stiffness(linkage, mean_clearances(c, worn))
     check_step(linkage, settings, K)
@@ -148,16 +177,28 @@ def simulate(
         control=settings.control,
         located=settings.located,
         worn=worn is not None,
+        loaded=loaded,
     )
     start = np.zeros((*lead, layout.states))
-    q, qd = initial or (initial_coordinates(scenario, c, K, worn), initial_speeds(scenario))
-    start[..., : layout.n] = of_shape(q, (layout.n,), "initial coordinates")
-    start[..., layout.n : 2 * layout.n] = of_shape(qd, (layout.n,), "initial speeds")
-    chi = damping(settings.impact, linkage.material.restitution)
+    if initial is None:
+        initial = (
+            initial_coordinates(scenario, c, K, worn, payloads=None if payloads is None else mass),
+            initial_speeds(scenario),
+        )
+    start[..., : layout.n] = of_shape(initial[0], (layout.n,), "initial coordinates")
+    start[..., layout.n : 2 * layout.n] = of_shape(initial[1], (layout.n,), "initial speeds")
+    different, number = np.unique(e, return_inverse=True)
+    chi = np.array([damping(settings.impact, x) for x in different])[number].reshape(*lead, 1)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
-    record = _run_lanes(scenario, layout, start.reshape(mu.size, layout.states), contacts, worn=worn, threads=threads)
-    return attrs.evolve(_unpack_record(scenario, layout, c, mu, record), worn=worn)
+    controllers = len(linkage.drives) if settings.control == "pd+ff" else 0
+    gains = np.tile(settings.gains, (mu.size, controllers))
+    if loaded:
+        gains = np.column_stack([gains, mass.ravel(), scale.ravel()])
+    runs = start.reshape(mu.size, layout.states), contacts, gains
+    record = _run_lanes(scenario, layout, runs, worn=worn, threads=threads)
+    simulation = _unpack_record(scenario, layout, c, mu, record)
+    return attrs.evolve(simulation, worn=worn, payloads=mass if loaded else None)
 
 
 def mean_clearances(clearances: Array, worn: WornWalls | None) -> Array:
@@ -165,7 +206,14 @@ def mean_clearances(clearances: Array, worn: WornWalls | None) -> Array:
     return clearances if worn is None else clearances + worn.means
 
 
-def initial_coordinates(scenario: Scenario, clearances: Array, K: Array, worn: WornWalls | None = None) -> Array:
+def initial_coordinates(
+    scenario: Scenario,
+    clearances: Array,
+    K: Array,
+    worn: WornWalls | None = None,
+    *,
+    payloads: Array | None = None,
+) -> Array:
     """Return (..., n) the coordinates from which runs start; elastic rods are bent as they are at rest.
 
     Args:
@@ -173,6 +221,7 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array, worn: W
         clearances: (..., p) [m].
         K: (..., p) stiffness of the contacts [N/m^1.5].
         worn: the walls of the pins, where they are worn.
+        payloads: (...) masses at the tip [kg].
     """
     ideal = scenario.ideal.q[0]
     if scenario.settings.start == "centred":
@@ -180,7 +229,7 @@ def initial_coordinates(scenario: Scenario, clearances: Array, K: Array, worn: W
             return find_static_equilibrium(scenario.linkage, ideal, np.zeros_like(clearances)).q
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
     elastic = None if scenario.settings.start == "rigid" else K
-    return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic, worn).q
+    return find_static_equilibrium(scenario.linkage, ideal, clearances, elastic, worn, payload=payloads).q
 
 
 def initial_speeds(scenario: Scenario) -> Array:
@@ -190,31 +239,44 @@ def initial_speeds(scenario: Scenario) -> Array:
 
 
 def _broadcast_parameters(
-    linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None
-) -> tuple[Array, Array]:
-    """Return clearances (..., p) and frictions (...), broadcast together."""
+    linkage: Linkage, clearances: ArrayLike | None, **others: ArrayLike | None
+) -> tuple[Array, list[Array]]:
+    """Return clearances (..., p) and other parameters (...), broadcast together; their usual values where not given."""
     c = linkage.clearance_array(clearances)
     if not np.all(c > 0):
         raise InvalidValueError(f"clearances: contact needs them above 0, got {c.min() * 1e3:g} mm")
-    mu = floats(linkage.material.friction if frictions is None else frictions, "frictions")
-    if np.any(mu < 0):
-        raise InvalidValueError(f"frictions: expected none below 0, got {mu.min():g}")
-    lead = leading_axes("clearances and frictions", [c, mu], [c.shape[:-1], mu.shape])
-    return np.broadcast_to(c, (*lead, c.shape[-1])), np.broadcast_to(mu, lead)
+    material = linkage.material
+    usual = {
+        "frictions": material.friction,
+        "restitutions": material.restitution,
+        "payloads": 0.0,
+        "torque_scales": 1.0,
+    }
+    numbers = [floats(usual[name] if value is None else value, name) for name, value in others.items()]
+    for name, values in zip(others, numbers, strict=True):
+        low, high = _RANGES[name]
+        if np.any(values < low) or (name in _ABOVE and np.any(values == low)):
+            bound = f"above {low:g}" if name in _ABOVE else f"none below {low:g}"
+            raise InvalidValueError(f"{name}: expected {bound}, got {values.min():g}")
+        if np.any(values > high):
+            raise InvalidValueError(f"{name}: expected none above {high:g}, got {values.max():g}")
+    given = [(name, values) for name, values in zip(others, numbers, strict=True) if others[name] is not None]
+    text, arrays = " and ".join(["clearances", *(name for name, _ in given)]), [values for _, values in given]
+    lead = leading_axes(text, [c, *arrays], [c.shape[:-1], *(values.shape for values in arrays)])
+    return np.broadcast_to(c, (*lead, c.shape[-1])), [np.broadcast_to(values, lead) for values in numbers]
 
 
 def _run_lanes(
     scenario: Scenario,
     layout: Layout,
-    start: Array,
-    contacts: Array,
+    parameters: tuple[Array, Array, Array],
     *,
     worn: WornWalls | None,
     threads: int | None,
 ) -> Record:
-    """Run the compiled simulation, blocks of lanes on several cores."""
+    """Run the compiled simulation from starts, with contacts and gains, blocks of lanes on several cores."""
     walls = np.zeros((0, 0, 0)) if worn is None else worn.table
-    runs, pins, rows = len(start), layout.pins, len(scenario.table)
+    runs, pins, rows = len(parameters[0]), layout.pins, len(scenario.table)
     marks = scenario.marks[: rows + 1]
     samples = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)
     record = Record(
@@ -222,10 +284,9 @@ def _run_lanes(
         impacts=np.zeros((runs, pins), dtype=np.int64),
         peaks=np.zeros((runs, pins)),
     )
-    gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
     run = _compiled_kernel(layout, scenario.settings.integrator)
     lengths = scenario.lengths[:rows]
-    inputs = (start, contacts, gains, scenario.table, lengths, samples, walls, *record)
+    inputs = (*parameters, scenario.table, lengths, samples, walls, *record)
     on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
     return record
 

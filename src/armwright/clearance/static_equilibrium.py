@@ -65,6 +65,8 @@ def find_static_equilibrium(
     clearances: ArrayLike | None = None,
     stiffness: ArrayLike | None = None,
     worn: WornWalls | None = None,
+    *,
+    payload: ArrayLike | None = None,
 ) -> StaticEquilibrium:
     """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
 
@@ -74,10 +76,11 @@ def find_static_equilibrium(
         clearances: (..., p) [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5]; rigid ones when left out.
         worn: walls of pins of these clearances, where they are worn.
+        payload: (...) masses at the tip [kg].
 
     Raises:
         InvalidValueError: a pin carries no force, so that its journal may lie anywhere; the linkage is singular; walls
-            are worn, and bodies elastic.
+            are worn, or there is a payload, and bodies elastic.
         ShapeError: an array does not fit.
     """
     start = floats(ideal, "ideal")
@@ -89,9 +92,10 @@ def find_static_equilibrium(
     q = np.array(np.broadcast_to(start, (*lead, start.shape[-1])))
     drives = q[..., list(linkage.driven)]
     still = np.zeros_like(q)
+    mass = None if payload is None else np.broadcast_to(floats(payload, "payload"), lead)
     converged = np.zeros((*lead, 1), dtype=bool)
     for _ in range(_MAX_ITERATIONS):
-        _, reactions = inverse_dynamics(linkage, q, still, still)
+        _, reactions = inverse_dynamics(linkage, q, still, still, mass)
         size = force_magnitudes(linkage, reactions)
         if worn is None:
             gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
@@ -109,6 +113,8 @@ def find_static_equilibrium(
     if linkage.rods:
         if worn is not None:
             refuse_rods("worn walls", linkage.rods)
+        if payload is not None:
+            refuse_rods("payloads", linkage.rods)
         q, size = _with_elastic_rods(linkage, q, drives, c, np.broadcast_to(np.asarray(K), c.shape))
     return StaticEquilibrium(q=q, tip=tip_position(linkage, q), gaps=pin_gaps(linkage, q), forces=size)
 

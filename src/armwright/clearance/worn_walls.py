@@ -30,6 +30,8 @@ from armwright.clearance.placement import Placement
 _BESIDE = 1.4
 # Cells of the table round each angle; an angle of more cells is no number any more.
 _CELLS, _FARTHEST = 360, 1e9
+# A journal nearer to the middle of its bearing has no direction [m].
+_TINY = 1e-12
 # An equilibrium is bracketed to this part of a cell of the table by so many halvings.
 _HALVINGS = 45
 
@@ -117,11 +119,12 @@ class WornWalls:
         """
         bearing, rotation = pin_directions(linkage, q)
         size = np.linalg.norm(gaps, axis=-1)
-        outward = gaps / np.maximum(size, np.finfo(float).tiny)[..., None]
+        far = np.maximum(size, _TINY)[..., None]
+        outward = gaps / far
         angle = np.arctan2(gaps[..., 1], gaps[..., 0]) - bearing
         places = [self.at(i, angle[..., i], rotation[..., i]) for i in range(len(linkage.pins))]
         growth, slope = (np.stack([place[k] for place in places], axis=-1) for k in range(2))
-        tilt = (slope / np.maximum(size, np.finfo(float).tiny))[..., None]
+        tilt = slope[..., None] / far
         along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
         return size - clearances - growth, outward - tilt * along
 

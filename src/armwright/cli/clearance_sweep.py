@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from typer import Option
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
-from armwright.cli.options import Json, Quiet
+from armwright.cli.numbers import named_ranges
+from armwright.cli.options import Json, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import sweep_bar, waiting
 
@@ -29,6 +30,13 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     runs: Annotated[int, Option("-n", "--runs", help="Number of linkages for lhs and sobol (a power of two).")] = 128,
     to_friction: Annotated[
         float | None, Option(help="Vary the coefficient of friction too, from 0 to this value.")
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        Option(
+            help="Vary a further parameter, as in payload=0:0.2 (kg at the tip), restitution=0.6:0.95, "
+            "torque_scale=0.98:1.02 or friction=0:0.1; may be repeated."
+        ),
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
@@ -53,11 +61,14 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     clearances. The folder has a page too, report.html.
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
+
+    **Example:** `armwright clearance sweep five-bar --vary payload=0:0.2 -n 256 -o out/payloads`
     """
     import numpy as np
 
     from armwright.arrays import integer
     from armwright.clearance.feature_sweep import FeatureSweep
+    from armwright.clearance.free_parameters import FREE_PARAMETERS
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.sweep_summary import sweep_summary
     from armwright.files.output import write_file
@@ -68,28 +79,31 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.sweep.runner import run
 
     check_extras()
+    ranges = named_ranges(vary or [], "--vary")
+    if to_friction is not None:
+        if "friction" in ranges:
+            raise usage_error("--to-friction", "expected it or --vary friction, got both")
+        ranges["friction"] = (0.0, to_friction)
     task = FeatureSweep(
         linkage=load_linkage(linkage),
         paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
         simulation_settings=settings_of(friction_velocity, threshold_mm_s, step=step),
-        with_friction=to_friction is not None,
+        free=tuple(ranges),
         replicates=replicates,
     )
-    bounds = dict.fromkeys(task.parameters, (from_mm * 1e-3, to_mm * 1e-3))
-    units = dict.fromkeys(task.parameters, "m")
-    if to_friction is not None:
-        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
+    bounds = dict.fromkeys(task.parameters, (from_mm * 1e-3, to_mm * 1e-3)) | ranges
+    units = dict.fromkeys(task.parameters, "m") | {name: FREE_PARAMETERS[name].unit for name in ranges}
     integer(levels, "levels", least=2)
     if design == "factorial":
         values = {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}
         plan = full_factorial(values, units=units)
     else:
         plan = (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)
-    # A wrong path, or a step too long for the smallest clearance, is reported now; and the simulation is compiled once,
-    # not by every worker.
+    # A wrong path, a step too long for the smallest clearance, or a range that does not exist is reported now; and the
+    # simulation is compiled once, not by every worker.
     if not (output / RESULTS).exists():
         with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
-            task(plan.points.min(axis=0, keepdims=True))
+            task(np.stack([plan.points.min(axis=0), plan.points.max(axis=0)]))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
         try:
             results = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)

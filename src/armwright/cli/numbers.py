@@ -8,6 +8,7 @@ from armwright.cli.options import usage_error
 
 # Possessive quantifiers: a text that is not a number is refused in time linear in its length.
 _NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
+_RANGE = re.compile(rf"(?P<name>[^=]+)=(?P<low>{_NUMBER}):(?P<high>{_NUMBER})")
 _NAMED = re.compile(rf"(?P<name>[^=]+)=(?P<number>{_NUMBER})(?P<unit>[a-zA-Z%/]*)")
 
 
@@ -80,6 +81,26 @@ def named_numbers(texts: Iterable[str], units: Sequence[str] | None, expected: s
         if name in named:
             raise usage_error(option, f"{name} occurs twice; expected each name once")
         named[name] = Named(name, float(match["number"]), match["unit"])
+    return named
+
+
+def named_ranges(texts: Iterable[str], option: str) -> dict[str, tuple[float, float]]:
+    """Read ranges with names, such as ``payload=0:0.2``, each name once.
+
+    Raises:
+        BadParameter: a text is not a named range of finite numbers, the second above the first, or a name occurs twice.
+    """
+    named: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        match = _RANGE.fullmatch(text.replace(" ", ""))
+        if match is None:
+            raise usage_error(option, f"expected a name and a range such as payload=0:0.2, got {text}")
+        name, (low, high) = match["name"], numbers(f"{match['low']},{match['high']}", 2, option)
+        if not low < high:
+            raise usage_error(option, f"{name}: expected a range whose second number is larger, got {low:g}:{high:g}")
+        if name in named:
+            raise usage_error(option, f"{name} occurs twice; expected each name once")
+        named[name] = (low, high)
     return named
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armwright.clearance.estimation.assessment import EstimateAssessment
+from armwright.clearance.free_parameters import FREE_PARAMETERS
 from armwright.clearance.sweep_summary import SweepSummary
 from armwright.files.result_table import ResultTable
 from armwright.report.elements import Card, Tile, downloads, figures, length_text, table, tables
@@ -59,8 +60,11 @@ def estimate_files(assessment: EstimateAssessment, *, name: str, command: str) -
 def _estimate_tiles(assessment: EstimateAssessment) -> Iterator[Tile]:
     for name, it in assessment.parameters.items():
         low, high = it["interval"]
-        if name == "friction":
-            yield Tile(f"{it['mean']:.3f}", f"friction, 90 % from {low:.3f} to {high:.3f}", mark=_mark(it))
+        if name in FREE_PARAMETERS:
+            unit = FREE_PARAMETERS[name].unit.replace("1", "")
+            between = f"90 % from {low:.4f} to {high:.4f} {unit}".rstrip()
+            text = between if it["identifiable"] else "not identifiable"
+            yield Tile(f"{it['mean']:.4f} {unit}".rstrip(), f"{name.replace('_', ' ')}, {text}", mark=_mark(it))
         else:
             between = f"90 % from {low * 1e3:.3f} to {high * 1e3:.3f} mm"
             text = between if it["identifiable"] else "not identifiable"
@@ -74,7 +78,7 @@ def _mark(parameter: Mapping[str, Any]) -> str:
 
 def _intervals(title: str, parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """Draw the estimates as dots with their intervals, those of lengths on one scale."""
-    lengths = {name: it for name, it in parameters.items() if name != "friction"}
+    lengths = {name: it for name, it in parameters.items() if name not in FREE_PARAMETERS}
     figure = empty_figure((6.4, 1.3 + 0.42 * len(lengths)))
     axes = plain_axes(figure, "radial clearance, mm", "")
     for row, it in enumerate(lengths.values()):

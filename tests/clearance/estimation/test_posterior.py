@@ -9,8 +9,10 @@ from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, fit_surrogate
 from armwright.clearance.estimation.measurement_file import PathMeasurement
 from armwright.clearance.estimation.posterior import Posterior, sample_posterior
-from armwright.clearance.feature_sweep import feature_vector
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector
 from armwright.clearance.features import Features, error_curve_features
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError
 from armwright.sweep.designs import sobol
@@ -203,10 +205,47 @@ def test_intervals_cover(swept: Swept, rng: np.random.Generator, sample: Sample)
     assert np.median([entry.misfit for entry in known]) > 0.05
 
 
+@pytest.mark.share(0.1)
+def test_unknown_payload(five_bar: Linkage, sample: Sample) -> None:
+    """Intervals hold clearances and payloads that nobody told; restitution, which these paths hide, is not known."""
+    pytest.importorskip("sklearn")
+    settings = Settings(step=2e-5, sample=2e-4)
+    task = FeatureSweep(
+        linkage=five_bar, paths=PATHS, free=("payload", "restitution"), replicates=0, simulation_settings=settings
+    )
+    names = tuple(f"{path}_{feature}" for path in PATHS for feature in FEATURES)
+    ranges = {**dict.fromkeys(task.parameters[:3], RANGE), "payload": (0.0, 0.2), "restitution": (0.6, 0.95)}
+    points = sobol(ranges, 64, 0).points
+    table = feature_vector(task(points), PATHS, FEATURES)
+    surrogate = fit_surrogate(task.parameters, points, names, table, ranges=list(ranges.values()))
+    held, known = [], []
+    for rng in sample.cases(20):
+        truth = np.array([*rng.uniform(0.15e-3, 0.45e-3, 3), rng.uniform(0.02, 0.18), rng.uniform(0.65, 0.9)])
+        clearances, free = truth[:3], {"payloads": truth[3], "restitutions": truth[4]}
+        runs = [simulate(scenario, clearances, **free) for scenario in task.tasks]
+        times = {path: run.time for path, run in zip(PATHS, runs, strict=True)}
+        errors = {
+            path: run.error + 2e-6 * rng.normal(size=run.error.shape) for path, run in zip(PATHS, runs, strict=True)
+        }
+        measured = PathMeasurement(times=times, errors=errors)
+        noise = measured.feature_covariance(names, 2e-6)
+
+        found = sample_posterior(surrogate, measured.feature_values(names), noise)
+
+        low, high = found.interval(0.9).T[:, :4]
+        held.append((low <= truth[:4]) & (truth[:4] <= high))
+        known.append(found.identifiable)
+        assert abs(found.mean[3] - truth[3]) < 1e-3
+    count = sum(map(len, held))
+    sample.record("intervals of 90 % that hold clearances and payload", count, count - int(np.sum(held)))
+    assert np.sum(held) >= binom.ppf(1 / 1000, count, 0.9)
+    assert all(one["payload"] and not one["restitution"] for one in known)
+
+
 def test_unknown_friction(swept: Swept) -> None:
     """Who does not know the friction knows the clearances less well, and is still right; who is sure of it errs."""
     pytest.importorskip("sklearn")
-    task = varied(swept.task, with_friction=True)
+    task = varied(swept.task, free=("friction",))
     names = tuple(name for name in swept.surrogate.features if "offset" not in name)
     points = sobol({**dict.fromkeys(swept.task.parameters, RANGE), "friction": (0.0, 0.1)}, 64, 0).points
     three = FEATURES[:3]

@@ -19,6 +19,7 @@ from armwright.clearance.estimation.model_errors import ModelError, model_errors
 from armwright.clearance.estimation.posterior import Posterior, sample_posterior
 from armwright.clearance.estimation.static_estimate import Estimate
 from armwright.clearance.estimation.sweep_surrogate import SweepSurrogate, learn_from_sweep
+from armwright.clearance.free_parameters import FREE_PARAMETERS, parameter_text
 from armwright.clearance.linkage import Linkage
 from armwright.errors import FileFormatError, TooFewError
 from armwright.files.inputs import read_text
@@ -31,7 +32,7 @@ _LEVEL = 0.9
 _SHOWN_UNITS = {"1": (1e2, "%", 10.0), "m": (1e3, "mm", 0.1), "rad": (180 / math.pi, "deg", 0.01)}
 # The least clearance drawn from an estimate: contact needs one [m].
 _MIN_CLEARANCE = 1e-6
-# A larger number is no clearance and no coefficient of friction, but another unit or another file.
+# A larger number is no clearance, but another unit or another file.
 _MAX_VALUE = 10.0
 
 
@@ -86,7 +87,7 @@ class EstimateAssessment:
     def tables(self) -> Iterator[ResultTable]:
         """Give the parameters, and the errors of the model that the readings would reveal."""
         names = list(self.parameters)
-        first = "parameter" if "friction" in names else "pin"
+        first = "parameter" if FREE_PARAMETERS.keys() & set(names) else "pin"
         heads = (first, "mean mm", "± mm", "90 % interval mm", "identifiable", *(f"r {name}" for name in names))
         rows = [
             (*_parameter_cells(name, parameter), *(f"{x:+z.2f}" for x in correlation))
@@ -107,10 +108,11 @@ class EstimateAssessment:
 
 
 def _parameter_cells(name: str, parameter: Mapping[str, Any]) -> tuple[str, ...]:
-    scale = 1.0 if name == "friction" else 1e3
+    unit = FREE_PARAMETERS[name].unit if name in FREE_PARAMETERS else None
+    scale = 1e3 if unit is None else 1.0
     low, high = (scale * x for x in parameter["interval"])
     return (
-        "friction, no unit" if name == "friction" else name,
+        name if unit is None else f"{name}, {'no unit' if unit == '1' else unit}",
         f"{scale * parameter['mean']:.4f}",
         f"{scale * parameter['deviation']:.4f}",
         f"{low:.4f} to {high:.4f}",
@@ -218,12 +220,15 @@ def assess_paths(
         *_predictability_notes(sweep),
         *_fit_notes(distribution.misfit, distribution.widening),
     ]
-    for name, end in distribution.bounds.items():
-        shown = f"{end:g}" if name == "friction" else f"{end * 1e3:g} mm"
-        notes.append(
-            f"{name.removeprefix('c_')} is at or beyond the end of the swept range, {shown}: it is not identifiable; "
-            f"sweep a larger range"
-        )
+    for name in distribution.names:
+        pin, end = name.removeprefix("c_"), distribution.bounds.get(name)
+        if name not in distribution.narrowed:
+            notes.append(f"{pin} is not identifiable: these paths hardly depend on it within its swept range")
+        elif end is not None:
+            notes.append(
+                f"{pin} is at or beyond the end of the swept range, {parameter_text(name, end)}: it is not "
+                f"identifiable; sweep a larger range"
+            )
     return EstimateAssessment(
         method="paths",
         parameters=_parameters(distribution, distribution.mean, distribution.identifiable),
@@ -259,7 +264,7 @@ def read_estimate_moments(path: Path, linkage: Linkage) -> tuple[Array, Array]:
         columns = [list(parameters).index(name) for name in linkage.clearances]
         identifiable = [parameters[name]["identifiable"] for name in linkage.clearances]
         # NaN is refused, too.
-        if not (np.abs([mean, deviation]) <= _MAX_VALUE).all():
+        if not (np.abs([mean[columns], deviation[columns]]) <= _MAX_VALUE).all():
             raise ValueError  # noqa: TRY301 - turned into a FileFormatError below
         covariance = correlation * np.outer(deviation, deviation)
         # It is one if numbers can be drawn by it.

@@ -18,6 +18,7 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, floats, one_core
 from armwright.clearance.estimation.kriging import Surrogate, solve_features
 from armwright.clearance.estimation.misfit import p_value, refuse_contradiction, widening
+from armwright.clearance.free_parameters import is_physical_end, parameter_text
 from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100
@@ -59,13 +60,13 @@ class Posterior:
     def bounds(self) -> Mapping[str, float]:
         """Parameters whose estimate is near an end of the swept range and that may lie beyond it, with that end.
 
-        A coefficient of friction of 0 is a physical bound, not an end of the range.
+        A coefficient of friction of 0 is a physical bound, not an end of the range; see ``free_parameters``.
         """
         ends = {}
         for i, name in enumerate(self.names):
             near = max(float(self.deviations[i]), _BOUND_TOLERANCE * float(self.upper[i] - self.lower[i]))
             for end in (float(self.lower[i]), float(self.upper[i])):
-                if abs(float(self.best[i]) - end) < near and end != 0:
+                if abs(float(self.best[i]) - end) < near and not is_physical_end(name, end):
                     ends[name] = end
         return ends
 
@@ -75,7 +76,7 @@ class Posterior:
         Raises:
             ContradictionError: no parameters explain the features.
         """
-        ends = [f"{name.removeprefix('c_')} at {_parameter_text(name, end)}" for name, end in self.bounds.items()]
+        ends = [f"{name.removeprefix('c_')} at {parameter_text(name, end)}" for name, end in self.bounds.items()]
         refuse_contradiction(self.misfit, self.residuals.items(), ends)
         return self
 
@@ -100,9 +101,14 @@ class Posterior:
 
         A bound narrows the distribution of a parameter beyond it.
         """
+        return {name: name in self.narrowed and name not in self.bounds for name in self.names}
+
+    @property
+    def narrowed(self) -> tuple[str, ...]:
+        """The parameters that are known much better than by the prior."""
         prior = (self.upper - self.lower) / np.sqrt(12)
         is_narrow = self.deviations <= _MAX_PRIOR_PART * prior
-        return {name: bool(x) and name not in self.bounds for name, x in zip(self.names, is_narrow, strict=True)}
+        return tuple(name for name, x in zip(self.names, is_narrow, strict=True) if x)
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (k, 2) the central interval in which each parameter lies with the probability ``level``."""
@@ -198,11 +204,6 @@ def _most_likely_fit(surrogate: Surrogate, goal: Array, noise: Array) -> _Fit:
         fits.append(_fit_at(surrogate, goal, noise, solve_features(surrogate, goal, covariance)))
         covariance = fits[-1].covariance
     return min(fits, key=lambda fit: fit.deviance)
-
-
-def _parameter_text(name: str, value: float) -> str:
-    """Return a parameter as text: clearances in mm."""
-    return f"{value * 1e3:g} mm" if name.startswith("c_") else f"{value:g}"
 
 
 def _sample_walkers(

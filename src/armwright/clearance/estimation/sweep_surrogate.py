@@ -15,6 +15,7 @@ import numpy.typing as npt
 from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, fit_surrogate
 from armwright.clearance.feature_sweep import is_random, is_sweep_of
+from armwright.clearance.free_parameters import FREE_PARAMETERS
 from armwright.clearance.linkage import Linkage
 from armwright.errors import FileFormatError, InvalidValueError, shown
 from armwright.sweep.folder import RESULTS
@@ -112,7 +113,9 @@ def _read_sweep(folder: Path | str, linkage: Linkage, paths: Sequence[str], feat
             settings = json.loads(data.attrs["settings"])
             design = json.loads(data.attrs["design"])["ranges"]
             same, replicates = is_sweep_of(settings, linkage), int(settings.get("replicates", 0))
-            parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
+            parameters = tuple(
+                name for name in map(str, data.coords) if name.startswith("c_") or name in FREE_PARAMETERS
+            )
             # The two bounds of a random design, or the levels of a full factorial.
             in_design = set(parameters) <= set(design)
             ranges = [_swept_range(design[name], name) for name in parameters] if in_design else None
