@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.linkage import Linkage
+from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.placement import Placement, Vec2
 from armwright.clearance.vibration.assessment import QUANTITIES, PathModes, RattlingAssessment
 from armwright.clearance.vibration.move_law import Aim
@@ -123,7 +123,7 @@ def _shapes(linkage: Linkage, along: PathModes) -> Iterator[Drawing]:
 
 def _moving_lines(linkage: Linkage, placement: Placement, shape: Array) -> Iterator[MovingLine]:
     for body in linkage.bodies:
-        points = [placement.frames[body.name].point(*map(float, point)) for point in body.points.values()]
+        points = [placement.point(BodyPoint(body.name, name)) for name in body.points]
         moved = [_moved(point.partials, shape) for point in points]
         yield MovingLine(np.array([[*point.position] for point in points], dtype=np.float64), np.array(moved))
     for pin in linkage.pins:
