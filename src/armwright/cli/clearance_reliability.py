@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Option
 
 from armwright.cli.linkages import LinkageName, path_of, with_clearances
-from armwright.cli.numbers import named_numbers, numbers
+from armwright.cli.numbers import named_numbers, numbers, within
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from armwright.reliability.linkage_assessment import WearStatement
     from armwright.reliability.linkage_errors import RandomClearances
 
+# Places of a tip and angles of a drive [mm] or [deg].
+_PLACES = -1e5, 1e5
+# Widths of bearings [mm].
+_WIDTHS = 1e-3, 1e4
 # Units of deviations, of which one need not be written.
 _UNITS = ("", "mm", "deg", "kg", "N")
 
@@ -132,7 +136,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             k=k * 1e-9,
             spread=k_spread,
             each=k_each,
-            width=width_mm * 1e-3,
+            width=within(width_mm, _WIDTHS, "--width-mm") * 1e-3,
             arc=arc_rad,
             steps=steps,
             limits={name: value * 1e-3 for name, value in limits.items() if value is not None},
@@ -171,11 +175,9 @@ def _place(model: "Linkage", text: str) -> list[float]:
     """Return the position of the tip [m], or the coordinate of the drive of a linkage with one [rad] or [m]."""
     import math
 
-    count = len(model.drives)
-    values = numbers(text, count, "--pose")
-    if count == 1 and model.coordinates[model.driven[0]].kind == "angle":
-        return [math.radians(values[0])]
-    return [value * 1e-3 for value in values]
+    turns = len(model.drives) == 1 and model.coordinates[model.driven[0]].kind == "angle"
+    values = numbers(text, len(model.drives), "--pose")
+    return [within(x, _PLACES, "--pose") * (math.radians(1) if turns else 1e-3) for x in values]
 
 
 def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:

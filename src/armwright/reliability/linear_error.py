@@ -26,7 +26,7 @@ _NEAR = 0.7
 # Numbers of a block of samples.
 _BLOCK = 4_000_000
 # Samples at each pose where no exact law holds.
-_AT_POSE = 20_000
+_AT_POSE = 50_000
 # Halvings of the interval in which a ray fails, and how far out it is looked for, in its own length.
 _HALVINGS, _FARTHEST = 20, 16.0
 
@@ -150,7 +150,8 @@ class LinearError:
             rows = min(block, count - first)
             z = rng.normal(size=(rows, L.shape[-1])) + centres[rng.choice(len(parts), rows, p=parts)]
             failed = (np.square(self.errors(z)).sum(axis=-1) > limit**2).any(axis=-1)
-            weights = 1 / (np.exp(z[failed] @ centres.T - halves) @ parts)
+            with np.errstate(over="ignore"):  # a weight of less than double could represent is none
+                weights = 1 / (np.exp(z[failed] @ centres.T - halves) @ parts)
             total, squares = total + float(weights.sum()), squares + float((weights**2).sum())
         mean = total / count
         return Estimate(mean, float(np.sqrt(max(squares / count - mean**2, 0.0) / count)), count)
