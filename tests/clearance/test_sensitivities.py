@@ -36,7 +36,7 @@ BY_ZEROS = (
 PRINTED = 5.1e-5
 # Steps of the differences, and what the derivatives differ by from them: by rounding in the equilibria, and by the
 # third derivatives.
-STEPS: Mapping[str, float] = {"m": 1e-6, "rad": 1e-6, "kg": 1e-2, "N": 1e-2}
+STEPS: Mapping[str, float] = {"m": 5e-7, "rad": 5e-7, "kg": 1e-2, "N": 1e-2}
 CLOSE = 1e-6
 
 
