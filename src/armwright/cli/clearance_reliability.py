@@ -103,7 +103,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Print how probable it is that the error of a linkage's tip passes a limit, new and worn.
 
-    The clearances are random, stated or estimated; lengths and zeros of drives may be, too. Printed are the probability
+    The clearances are random, stated or estimated; all other dimensions may be, too. Printed are the probability
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
     which pin counts most. Measurements of the worn linkage (--measured) update both. With -o, report.html shows the
@@ -120,6 +120,8 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--limit", "expected a limit of the error, --limit MM, or a life, --k with a limit")
     if estimate is not None and (clearance or sd):
         raise usage_error("--estimate", "give either --estimate or --clearance and --sd")
+    if strokes is not None and limit is None:
+        raise usage_error("--strokes", "expected the limit of the error too, --limit MM")
     named = named_numbers(sd or (), _UNITS, "a dimension and its deviation, J2=0.02 or link1.zero=0.01deg", "--sd")
     way = None if path is None and speed_rpm is None else path_of(model, path, speed_rpm, 1.0)
     places = None if not pose else [_place(model, text) for text in pose]

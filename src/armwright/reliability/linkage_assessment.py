@@ -397,7 +397,7 @@ def assess_linkage(
     """
     say = progress or (lambda _: None)
     random = RandomLinkage.at(linkage, q, clearances, deviations, friction=friction)
-    count = integer(samples or _SAMPLES[bool(random.deviations)], "samples", least=2)
+    count = integer(_SAMPLES[bool(random.deviations)] if samples is None else samples, "samples", least=2)
     if count * len(random.q) > _MOST_EQUILIBRIA:
         raise InvalidValueError(
             f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {count}"
