@@ -36,6 +36,7 @@ _STUDIES = {
     "five-bar-clearance": ("five_bar_clearance_study", "FiveBarClearance"),
     "dh-calibration": ("dh_calibration_study", "DhCalibration"),
     "identified-arm": ("identified_arm", "IdentifiedArm"),
+    "linkage-simulators": ("linkage_simulators", "LinkageSimulators"),
 }
 STUDIES = tuple(_STUDIES)
 
