@@ -320,6 +320,12 @@ def plan_checks(
     if now > belief.strokes:
         history.append(belief.at(now, rng))
     fresh, due, stop = planner.changes(history[-1], rng)
+    if stop.strokes < now + strategy.soonest:
+        raise InvalidValueError(
+            f"limit: {strategy.limit * 1e3:g} mm cannot be kept: a check would be due after {stop.strokes - now:.3g} "
+            f"strokes, with all corrections and changes; expected {strategy.soonest:.3g} or more, a tenth of the least "
+            f"interval"
+        )
     planned, *fixed = compare_ways(planner, history[-1], lives, seed, progress)
     return CheckPlan(
         planner=planner,
