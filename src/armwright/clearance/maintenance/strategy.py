@@ -155,9 +155,8 @@ class Planner:
         drift = np.maximum.accumulate(np.linalg.norm(shifts, axis=-1).max(axis=-1))
         step = 2 * _DRIFT_SHARE * self.strategy.limit
         count = min(int(drift[-1] / step) + 1, _MOST_CORRECTIONS)
-        # Where the drift stands still its inverse has no value; the last of equal ones is taken.
+        # Where the drift stands still its inverse has no value.
         rising = np.append(True, np.diff(drift) > 0)
-
         starts, middles = (
             np.interp(step * (np.arange(count) + part), drift[rising], times[rising]) for part in (0.0, 0.5)
         )
@@ -229,7 +228,9 @@ class Planner:
             for pin in set(range(len(beyond))) - set(changed):
                 other = belief.with_new_bearing(pin, rng)
                 tried[pin] = other, self.next_stop(other)
-            better = {pin: result for pin, result in tried.items() if result[1].strokes > stop.strokes}
+            # What helps for less than two stops lie apart may be chance.
+            least = stop.strokes + strategy.soonest
+            better = {pin: result for pin, result in tried.items() if result[1].strokes > least}
             if not better:
                 break
             pin = max(better, key=lambda k: better[k][1].strokes)
