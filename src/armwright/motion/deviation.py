@@ -115,6 +115,11 @@ class TrackingError(NamedTuple):
         """When the largest distance of all was sampled [s]."""
         return float(self.times[self.sampled_position.argmax()])
 
+    @property
+    def largest(self) -> Tolerance:
+        """Upper bounds of distance and angle on all intervals."""
+        return Tolerance(float(self.position.max()), float(self.orientation.max()))
+
 
 class ToolMotion(Protocol):
     """A motion of the tool that the joints are to follow."""
@@ -444,8 +449,8 @@ def _leg_distance(p: Array, A: Array, B: Array) -> Array:
     return np.asarray(np.linalg.norm(p - A - along[..., None] * leg, axis=-1))
 
 
-def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> Tolerance:
-    """Return upper bounds of how far the tool is from a straight line, and from the orientation that belongs there.
+def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> TrackingError:
+    """Return how far the tool is from a straight line, and from the orientation that belongs there.
 
     The motion may be polynomials of any degree. Between samples a time d apart position and orientation leave their
     chords by no more than d²/8 times their greatest second derivatives.
@@ -467,16 +472,25 @@ def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> 
     )
     h = trajectory.lengths
     count = max(_SAMPLES[0], math.ceil(float(h.max()) / _LINE_STEP))
-    q = np.stack([evaluate(trajectory.coefficients, (part * h)[:, None]) for part in np.arange(count + 1) / count])
+    parts = (np.arange(count + 1) / count)[:, None]
+    q = np.stack([evaluate(trajectory.coefficients, (part * h)[:, None]) for part in parts])
     X = np.asarray(forward(arm, q))
     p = X[..., :3, 3] - A[:3, 3]
     along = p @ shift / max(length**2, _SMALL**2)
-    away = np.linalg.norm(p - np.clip(along, 0, 1)[..., None] * shift, axis=-1).max(axis=0)
+    away = np.linalg.norm(p - np.clip(along, 0, 1)[..., None] * shift, axis=-1)
     due = A[:3, :3] @ rotation_from_vector(along[..., None] * turn)
     sines = half_sines(due, X[..., :3, :3]).max(axis=0)
     between = (h / count) ** 2 / 8
-    sine = float((sines + between * bend).max())
-    return Tolerance(float((away + between * tool.acceleration).max()), 2 * math.asin(min(sine, 1.0)))
+    way = along.T.ravel() * length
+    return TrackingError(
+        position=away.max(axis=0) + between * tool.acceleration,
+        orientation=2 * np.arcsin(np.minimum(sines + between * bend, 1.0)),
+        sampled_position=away.max(axis=0),
+        sampled_orientation=2 * np.arcsin(np.minimum(sines, 1.0)),
+        times=(trajectory.times[:-1] + parts * h)[away.argmax(axis=0), np.arange(len(h))],
+        samples=count,
+        backward=float((np.maximum.accumulate(way) - way).max() + 2 * (between * tool.acceleration).max()),
+    )
 
 
 def _tool_bounds(arm: Arm, trajectory: Trajectory) -> tuple[ToolBounds, Array]:
