@@ -166,7 +166,7 @@ def _certified(
         start, end = (solver_of(arm).forward(planned.trajectory(t)) for t in (0.0, planned.trajectory.duration))
         if np.linalg.norm(end[:3, 3] - start[:3, 3]) < _TURN:
             raise LeftLineError(number, "on this line the tool only turns, and the path of a turn is not certified")
-        error, allowed = distance_from_line(model, motion, start, end), tolerance(deviation)
+        error, allowed = distance_from_line(arm, motion, start, end), tolerance(deviation)
         found = error.largest
         backward = error.backward or 0.0
         if found.position > allowed.position or found.orientation > allowed.orientation or backward > deviation:
