@@ -17,7 +17,7 @@ from armwright.motion.trajectory import Trajectory
 # Configurations at which frequencies are computed.
 _MEAN = 101
 # A shaper takes so long at most [s].
-LONGEST = 60.0
+_LONGEST = 60.0
 
 
 @attrs.frozen(kw_only=True)
@@ -38,7 +38,7 @@ class ModeShaping:
 class ModeShaper(NamedTuple):
     """A shaper and the frequencies (k,) that it shapes, slowest first [Hz]."""
 
-    by: Shaper
+    shaper: Shaper
     frequencies: Array
 
 
@@ -92,9 +92,9 @@ def mode_shaper(arm: Arm, planned: Trajectory, shaping: ModeShaping) -> ModeShap
     slowest = np.flatnonzero(damping < 1)[: integer(shaping.count, "count", least=1)]
     pairs = zip(frequencies[slowest].tolist(), damping[slowest].tolist(), strict=True)
     by = combined([shaper(shaping.kind, f, z, tolerance=shaping.tolerance) for f, z in pairs])
-    if by.duration > LONGEST:
+    if by.duration > _LONGEST:
         raise InvalidValueError(
             f"{shaping.kind} would add {by.duration:.3g} s to the move, for gears that vibrate at "
-            f"{frequencies[0]:.3g} Hz; expected {LONGEST:g} s at most: check the stiffness of the gears"
+            f"{frequencies[0]:.3g} Hz; expected {_LONGEST:g} s at most: check the stiffness of the gears"
         )
     return ModeShaper(by, frequencies[slowest])

@@ -49,21 +49,21 @@ class SmoothStage:
     Attributes:
         planned: the stage as it was.
         leg: its motion, slowed where limits ask for that, so that it ends on a tick when it is shaped.
-        shaper: of it; None where it stands.
+        mode: the shaper and its frequencies; None where the stage stands.
         factor: how many times slower the leg is than it was, for a limit.
         because: which limit, and which joint, from 0; None for none.
     """
 
     planned: PlannedStage
     leg: Trajectory
-    shaper: ModeShaper | None
+    mode: ModeShaper | None
     factor: float = 1.0
     because: BindingLimit | None = None
 
     @property
     def trajectory(self) -> Trajectory:
         """The motion."""
-        return self.leg if self.shaper is None else shaped(self.leg, self.shaper.by)
+        return self.leg if self.mode is None else shaped(self.leg, self.mode.shaper)
 
 
 def smooth_stages(
@@ -93,18 +93,14 @@ def _smooth(
 ) -> SmoothStage:
     leg, factor, because = stage.trajectory, 1.0, None
     if not leg.duration:
-        return SmoothStage(planned=stage, leg=leg, shaper=None)
+        return SmoothStage(planned=stage, leg=leg, mode=None)
     model = solver_of(arm).arm
-    by = mode_shaper(model, leg, shaping)
+    mode = mode_shaper(model, leg, shaping)
+    delay = mode.shaper.duration
     for _ in range(_ROUNDS):
-        ticks = math.ceil((leg.duration + by.by.duration) / period - _TICK)
-        found = SmoothStage(
-            planned=stage,
-            leg=leg.retimed(ticks * period - by.by.duration),
-            shaper=by,
-            factor=factor,
-            because=because,
-        )
+        ticks = math.ceil((leg.duration + delay) / period - _TICK)
+        leg = leg.retimed(ticks * period - delay)
+        found = SmoothStage(planned=stage, leg=leg, mode=mode, factor=factor, because=because)
         motion = found.trajectory
         slower_by, limit = slowing_for_limits(arm, motion)
         if tool is not None:
@@ -118,7 +114,7 @@ def _smooth(
 
 def lasting(stages: Sequence[SmoothStage], duration: float, period: float) -> list[SmoothStage]:
     """Return stages slowed so that they take a duration together [s], rounded up to a tick; none is run faster."""
-    moving = [stage for stage in stages if stage.shaper is not None]
+    moving = [stage for stage in stages if stage.mode is not None]
     least = sum(round(stage.trajectory.duration / period) for stage in moving)
     more = max(0, math.ceil(duration / period - _TICK) - least)
     ends = np.cumsum([stage.leg.duration for stage in moving])
@@ -126,7 +122,7 @@ def lasting(stages: Sequence[SmoothStage], duration: float, period: float) -> li
     extra = iter(shares.tolist())
     return [
         stage
-        if stage.shaper is None
+        if stage.mode is None
         else attrs.evolve(
             stage, leg=stage.leg.retimed(stage.leg.duration + next(extra) * period), factor=1.0, because=None
         )
@@ -148,6 +144,7 @@ def certified(
 
     Raises:
         LeftLineError: a straight line would be left by more.
+        IncapableArmError: the limits are not kept in the duration that was asked for.
     """
     return [_certified(arm, k, stage, shaping, deviation, fixed=fixed) for k, stage in enumerate(stages)]
 
@@ -155,10 +152,12 @@ def certified(
 def _certified(
     arm: AnyArm, number: int, stage: SmoothStage, shaping: ModeShaping, deviation: float, *, fixed: bool
 ) -> PlannedStage:
-    planned, by = stage.planned, stage.shaper
-    if by is None:
+    planned, mode = stage.planned, stage.mode
+    if mode is None:
         return planned
     motion, model = stage.trajectory, solver_of(arm).arm
+    if fixed and slowing_for_limits(arm, motion)[0] > 1 + ROUNDING:
+        raise IncapableArmError("in this time its limits are not kept")
     is_slow = stage.because is not None
     slowed = slower(model, stage.factor, stage.because) if stage.because is not None else planned.slowed
     certificate, away = None, 0.0
@@ -168,11 +167,12 @@ def _certified(
             raise LeftLineError(number, "on this line the tool only turns, and the path of a turn is not certified")
         error, allowed = distance_from_line(arm, motion, start, end), tolerance(deviation)
         found = error.largest
-        backward = error.backward or 0.0
-        if found.position > allowed.position or found.orientation > allowed.orientation or backward > deviation:
+        # Running back along the line is leaving it too.
+        off = max(found.position, error.backward or 0.0)
+        if off > allowed.position or found.orientation > allowed.orientation:
             raise LeftLineError(
                 number,
-                f"shaped by {shaping.kind}, the line would be left by up to {found.position * 1e3:.3g} mm and "
+                f"shaped by {shaping.kind}, the line would be left by up to {off * 1e3:.3g} mm and "
                 f"{found.orientation * 1e3:.3g} mrad; {allowed.position * 1e3:g} mm and "
                 f"{allowed.orientation * 1e3:g} mrad are allowed",
             )
@@ -191,7 +191,7 @@ def _certified(
         unmet=None if fixed else planned.unmet,
         shaping=StageShaping(
             kind=shaping.kind,
-            frequencies=by.frequencies,
+            frequencies=mode.frequencies,
             added=0.0 if fixed else motion.duration - planned.trajectory.duration,
             deviation=away,
         ),

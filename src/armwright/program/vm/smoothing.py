@@ -44,19 +44,16 @@ def smoothed_stages(
     if not np.isfinite(cell.arms[arm].arm.motor_values("stiffness")).any():
         text, advice = no_flexible_gear(arm)
         raise machine.error(process, "E259", text, span, "nothing vibrates", helps=[advice])
+    fixed = request.duration is not None
     try:
         smooth = smooth_stages(planner, stages, shaping, cell.period, tool=request.tool)
-    except (UnsupportedArmError, InvalidValueError, IncapableArmError) as error:
-        text = f"{arm} cannot make this MOVE smoothly: {error}"
-        raise machine.error(process, "E414", text, span, "asked for here") from None
-    if request.duration is not None:
-        shortest = sum(stage.trajectory.duration for stage in smooth)
-        if request.duration < shortest - cell.period:
-            text = f"this MOVE is infeasible in {request.duration:g} s"
-            raise machine.error(process, "E405", text, span, f"shaped, it takes {shortest:.3f} s or more")
-        smooth = lasting(smooth, request.duration, cell.period)
-    try:
-        return certified(planner, smooth, shaping, cell.deviation, fixed=request.duration is not None)
+        if request.duration is not None:
+            shortest = sum(stage.trajectory.duration for stage in smooth)
+            if request.duration < shortest - cell.period:
+                text = f"this MOVE is infeasible in {request.duration:g} s"
+                raise machine.error(process, "E405", text, span, f"shaped, it takes {shortest:.3f} s or more")
+            smooth = lasting(smooth, request.duration, cell.period)
+        return certified(planner, smooth, shaping, cell.deviation, fixed=fixed)
     except LeftLineError as error:
         goal = stages_of(request.form)[error.stage].frames[-1]
         text = f"{arm} would leave the straight line to `{goal}`"
@@ -65,3 +62,6 @@ def smoothed_stages(
             "the cell file may allow more by `deviation_mm` of [motion], or shape less by `shaper` and `modes`",
         ]
         raise machine.error(process, "E413", text, span, "asked for here", notes=[str(error)], helps=helps) from None
+    except (UnsupportedArmError, InvalidValueError, IncapableArmError) as error:
+        text = f"{arm} cannot make this MOVE smoothly: {error}"
+        raise machine.error(process, "E414", text, span, "asked for here") from None
