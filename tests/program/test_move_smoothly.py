@@ -215,6 +215,7 @@ def test_a_stop_on_the_way() -> None:
         check_ticks(recording)
     assert 60 < float(printed(halted)[0]) < 149
     assert float(printed(braked)[0]) < 1e-6
+    assert [stage.stage.shaping is None for stage in braked.stages] == [False, True]
 
 
 def test_no_other_way() -> None:
