@@ -93,8 +93,8 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.clearance.maintenance.assessment import plan_checks as planned
     from armwright.clearance.maintenance.check_file import PastCheck, read_checks
+    from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
     from armwright.clearance.maintenance.strategy import Strategy
-    from armwright.clearance.maintenance.wearing_linkage import wearing_linkage
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.wear.worn_surfaces import WearLaw
     from armwright.report.check_plan_files import check_plan_files
@@ -126,7 +126,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     law = WearLaw(coefficient=1.0, width=width_mm * 1e-3, bearing_share=bearing_share)
     stroke = path_of(model, path, speed_rpm, 1.0)
-    machine = wearing_linkage(model, stroke, law, exposure=horizon * prior.fastest, poses=poses)
+    machine = maintained_linkage(model, stroke, law, exposure=horizon * prior.fastest, poses=poses)
     with counting("lives", quiet=quiet or as_json) as progress:
         plan = planned(
             machine,
