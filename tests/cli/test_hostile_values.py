@@ -90,6 +90,17 @@ CALLS: dict[str, list[str]] = {
         "--json",
     ],
     "clearance export": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "-o", "out"],
+    "clearance tolerance": [
+        "five-bar",
+        "bar_tolerances.toml",
+        "--pose",
+        "0,-575",
+        "--limit",
+        "0.1",
+        "--samples",
+        "2",
+        "--json",
+    ],
     "clearance reliability": ["five-bar", "--pose", "0,-575", "--limit", "0.6", "--samples", "20", "--json"],
     "tolerance": ["puma560", "tolerances.toml", "-q", Q, "--limit", "0.5", "--samples", "20", "--json"],
     "life": ["puma560", "efforts.csv", "life.toml", "--limit", "0.1", "--samples", "20", "--json"],
@@ -114,6 +125,7 @@ GIVEN = {
     "corners.csv": "board_corners.csv",
     "rest.csv": "five_bar_rest.csv",
     "tolerances.toml": "puma_tolerances.toml",
+    "bar_tolerances.toml": "five_bar_tolerances.toml",
     "life.toml": "puma_life.toml",
 }
 VALUES = [
