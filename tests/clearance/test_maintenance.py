@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.maintenance.assessment import learn
+from armwright.clearance.maintenance.assessment import learn, plan_checks
 from armwright.clearance.maintenance.belief import Belief, Measured, WearPrior
 from armwright.clearance.maintenance.check_file import ClearanceCheck, read_checks
 from armwright.clearance.maintenance.comparison import compare_ways
@@ -244,6 +244,12 @@ def test_check_that_nobody_expected(machine: MaintainedLinkage) -> None:
 
     low, high = learn(planner, start, [grown, new], {"J2": 1e7}, rng)[-1].interval()[0][:, 0]
     assert low < 1.02e-4 < high
+
+
+def test_limit_that_no_plan_keeps(machine: MaintainedLinkage) -> None:
+    """Where new bearings alone scatter beyond the limit, no check could help, and the plan says so."""
+    with pytest.raises(InvalidValueError, match=r"limit: 0.1 mm cannot be kept: a check would be due after 0 strokes"):
+        plan_checks(machine, prior(clearance_spread=2e-4), strategy())
 
 
 def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:

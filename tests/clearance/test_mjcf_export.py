@@ -60,6 +60,7 @@ def followed(scenario: Scenario, folder: Path) -> tuple[float, float]:
     return float(apart), float(np.ptp(reference[:, 1:], axis=0).max())
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("name", "path"),
     [

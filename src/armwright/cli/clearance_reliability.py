@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Option
 
 from armwright.cli.linkages import LinkageName, path_of, with_clearances
-from armwright.cli.numbers import named_numbers, numbers
+from armwright.cli.numbers import named_numbers, numbers, within
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from armwright.reliability.linkage_assessment import WearStatement
     from armwright.reliability.linkage_errors import RandomClearances
 
+# Places of a tip and angles of a drive [mm] or [deg].
+_PLACES = -1e5, 1e5
+# Widths of bearings [mm].
+_WIDTHS = 1e-3, 1e4
 # Units of deviations, of which one need not be written.
 _UNITS = ("", "mm", "deg", "kg", "N")
 
@@ -99,7 +103,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Print how probable it is that the error of a linkage's tip passes a limit, new and worn.
 
-    The clearances are random, stated or estimated; lengths and zeros of drives may be, too. Printed are the probability
+    The clearances are random, stated or estimated; all other dimensions may be, too. Printed are the probability
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
     which pin counts most. Measurements of the worn linkage (--measured) update both. With -o, report.html shows the
@@ -116,6 +120,8 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--limit", "expected a limit of the error, --limit MM, or a life, --k with a limit")
     if estimate is not None and (clearance or sd):
         raise usage_error("--estimate", "give either --estimate or --clearance and --sd")
+    if strokes is not None and limit is None:
+        raise usage_error("--strokes", "expected the limit of the error too, --limit MM")
     named = named_numbers(sd or (), _UNITS, "a dimension and its deviation, J2=0.02 or link1.zero=0.01deg", "--sd")
     way = None if path is None and speed_rpm is None else path_of(model, path, speed_rpm, 1.0)
     places = None if not pose else [_place(model, text) for text in pose]
@@ -132,7 +138,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             k=k * 1e-9,
             spread=k_spread,
             each=k_each,
-            width=width_mm * 1e-3,
+            width=within(width_mm, _WIDTHS, "--width-mm") * 1e-3,
             arc=arc_rad,
             steps=steps,
             limits={name: value * 1e-3 for name, value in limits.items() if value is not None},
@@ -171,11 +177,9 @@ def _place(model: "Linkage", text: str) -> list[float]:
     """Return the position of the tip [m], or the coordinate of the drive of a linkage with one [rad] or [m]."""
     import math
 
-    count = len(model.drives)
-    values = numbers(text, count, "--pose")
-    if count == 1 and model.coordinates[model.driven[0]].kind == "angle":
-        return [math.radians(values[0])]
-    return [value * 1e-3 for value in values]
+    turns = len(model.drives) == 1 and model.coordinates[model.driven[0]].kind == "angle"
+    values = numbers(text, len(model.drives), "--pose")
+    return [within(x, _PLACES, "--pose") * (math.radians(1) if turns else 1e-3) for x in values]
 
 
 def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:

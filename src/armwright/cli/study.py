@@ -11,7 +11,7 @@ from armwright.cli.results import write_results
 from armwright.cli.shell_completion import listed_in
 
 # Studies that show progress bars.
-_WITH_BARS = {"five-bar-clearance", "five-bar-life"}
+_WITH_BARS = {"five-bar-clearance", "five-bar-life", "linkage-simulators"}
 
 
 def study(
@@ -19,7 +19,7 @@ def study(
         str,
         Argument(
             help="Name of the study: stanford-torque, puma-moves, five-bar-clearance, dh-calibration, five-bar-life, "
-            "identified-arm.",
+            "identified-arm, linkage-simulators.",
             autocompletion=listed_in("armwright.study.study", "STUDIES"),
         ),
     ],
@@ -48,6 +48,9 @@ def study(
 
     identified-arm: an arm is logged in a cell with physics, identified from its log, and tracks another motion with
     what its drawing says, what was identified, and the truth (simulated; extra `identification`).
+
+    linkage-simulators: the linkages of the catalogue with clearance beside Exudyn, where that is installed, and without
+    beside MuJoCo: how far the tips are apart over time.
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """

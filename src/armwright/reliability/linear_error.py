@@ -26,7 +26,7 @@ _NEAR = 0.7
 # Numbers of a block of samples.
 _BLOCK = 4_000_000
 # Samples at each pose where no exact law holds.
-_AT_POSE = 20_000
+_AT_POSE = 50_000
 # Halvings of the interval in which a ray fails, and how far out it is looked for, in its own length.
 _HALVINGS, _FARTHEST = 20, 16.0
 

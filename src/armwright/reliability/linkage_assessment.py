@@ -31,7 +31,7 @@ from armwright.reliability.linear_error import Estimate
 from armwright.reliability.linkage_errors import RandomClearances, RandomLinkage
 from armwright.reliability.linkage_life import PARTS, LinkageLife
 from armwright.reliability.linkage_wear import GapGrowth, Measure, WearingLinkage
-from armwright.reliability.wear_measurements import WearMeasurement, measured_residuals
+from armwright.reliability.wear_measurements import MOST_STROKES, WearMeasurement, measured_residuals
 from armwright.reliability.weighted_draws import draw
 
 # What a user writes for a unit, and its SI value.
@@ -397,7 +397,7 @@ def assess_linkage(
     """
     say = progress or (lambda _: None)
     random = RandomLinkage.at(linkage, q, clearances, deviations, friction=friction)
-    count = integer(samples or _SAMPLES[bool(random.deviations)], "samples", least=2)
+    count = integer(_SAMPLES[bool(random.deviations)] if samples is None else samples, "samples", least=2)
     if count * len(random.q) > _MOST_EQUILIBRIA:
         raise InvalidValueError(
             f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {count}"
@@ -464,6 +464,8 @@ def _with_lives(
 def _after(life: LinkageLife, wear: WearStatement, seed: int) -> tuple[float, Estimate]:
     """Return strokes and the probability of an error beyond its limit after them: of measured linkages by the draws."""
     strokes = not_negative(wear.after or 0.0, "strokes")
+    if strokes > MOST_STROKES:
+        raise InvalidValueError(f"strokes: expected at most {MOST_STROKES:g}, got {strokes:g}")
     if wear.measured:
         return strokes, Estimate(*life.probability(strokes), len(life.strokes))
     return strokes, life.wearing.error_after(strokes).path_probability(life.limit, seed=seed)

@@ -32,6 +32,10 @@ Shape: TypeAlias = Literal["normal", "lognormal"]
 SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
 # An eigenvalue of a covariance below this part of the largest is rounding.
 _FLAT = 1e-12
+# A clearance that varies by more is none [m].
+_WIDEST = 1.0
+# Logarithm of a factor that is beyond every limit, and whose square can be represented.
+LARGEST_LOG = 100.0
 # Equilibria that are solved at once.
 _BLOCK = 20_000
 # Standard deviation of a number that is evenly spread from -1 to 1.
@@ -77,6 +81,10 @@ class RandomClearances:
             p and values[0] < -1e-9 * max(float(values[-1]), 1e-300)
         ):
             raise InvalidValueError("clearances: expected a symmetric covariance without negative eigenvalues")
+        if p and self.deviations.max() > _WIDEST:
+            raise InvalidValueError(
+                f"clearances: expected deviations up to {_WIDEST * 1e3:g} mm, got {self.deviations.max() * 1e3:g} mm"
+            )
         if self.shape == "lognormal" and (self._relative <= -1).any():
             raise InvalidValueError("clearances: no lognormal ones have correlations that are so negative")
 
@@ -116,7 +124,8 @@ class RandomClearances:
         shifts = z @ self._root.T
         if self.shape == "normal":
             return np.maximum(self.mean + shifts, 0.0)
-        return np.asarray(self.mean * np.exp(shifts - np.diag(np.log1p(self._relative)) / 2))
+        logs = np.minimum(shifts - np.diag(np.log1p(self._relative)) / 2, LARGEST_LOG)
+        return np.asarray(self.mean * np.exp(logs))
 
 
 @attrs.frozen(kw_only=True, eq=False)

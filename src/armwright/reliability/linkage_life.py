@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import attrs
 import numpy as np
 
@@ -86,17 +88,16 @@ class LinkageLife:
         weights = self.draws.weights[lived]
         return np.asarray(weights @ parts / weights.sum())
 
-    @property
+    @cached_property
     def _tenths(self) -> list[tuple[Numbers, WeightedDraws]]:
         """Rows and draws of the tenths of linkages whose wear coefficients make the longest and the shortest lives."""
-        if not self.wearing.spread:
+        lived = np.isfinite(self.strokes) & (self.strokes > 0)
+        if not self.wearing.spread or not lived.any():
             return [(np.arange(len(self.strokes)), self.draws)]
         numbers = self.draws.z[:, len(self.wearing.random.names) :]
-        bounded = np.clip(self.strokes, 1e-6, 1e300)
-        weights = np.sqrt(self.draws.weights)
-        design = np.concatenate([np.ones((len(numbers), 1)), numbers], axis=1)
-        lived = np.isfinite(self.strokes) & (self.strokes > 0)
-        slopes = np.linalg.lstsq((design * weights[:, None])[lived], (np.log(bounded) * weights)[lived], rcond=None)[0]
+        design = np.concatenate([np.ones((len(numbers), 1)), numbers], axis=1)[lived]
+        weights = np.sqrt(self.draws.weights[lived])
+        slopes = np.linalg.lstsq(design * weights[:, None], np.log(self.strokes[lived]) * weights, rcond=None)[0]
         order = np.argsort(numbers @ slopes[1:], kind="stable")
         total = np.cumsum(self.draws.weights[order])
         fast, slow = order[total <= _TENTH], order[total > 1 - _TENTH]

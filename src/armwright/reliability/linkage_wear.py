@@ -23,9 +23,13 @@ from armwright.clearance.wear.worn_stroke import resting_gaps
 from armwright.clearance.wear.worn_surfaces import mean_growth
 from armwright.errors import InvalidValueError
 from armwright.reliability.linear_error import LinearError
-from armwright.reliability.linkage_errors import RandomLinkage
+from armwright.reliability.linkage_errors import LARGEST_LOG, RandomLinkage
 
 Measure: TypeAlias = Literal["error", "RP"]
+# Least and largest median of a wear coefficient [m²/N], and the largest spread of its logarithm.
+_COEFFICIENTS, _WIDEST = (1e-24, 1e-6), 5.0
+# The least arc on which a pin wears [rad].
+_LEAST_ARC = 1e-3
 # Visits of a pose from which its repeatability follows.
 _VISITS = 20_000
 # A life is found between strokes that differ by a factor of two, by so many halvings.
@@ -59,7 +63,8 @@ class GapGrowth:
             width: of the bearings [m].
         """
         radii = [pin.journal_radius for pin in random.linkage.pins]
-        positive(arc, "arc", "rad")
+        if not _LEAST_ARC <= positive(arc, "arc", "rad") <= 2 * np.pi:
+            raise InvalidValueError(f"arc: expected {_LEAST_ARC:g} to {2 * np.pi:.4g} rad, got {arc:g}")
         positive(width, "width", "m")
         lengths = np.array([mean_growth(1.0, w, r, arc, width) for w, r in zip(work, radii, strict=True)])
         lengths = np.broadcast_to(lengths, (len(random.q), len(radii)))
@@ -125,8 +130,15 @@ class WearingLinkage:
         """Check the ranges."""
         if self.random.friction:
             raise InvalidValueError("random: expected a linkage without friction: where journals lie is new every time")
-        positive(self.median, "wear coefficient")
-        not_negative(self.spread, "spread of the wear coefficient")
+        if not _COEFFICIENTS[0] <= positive(self.median, "wear coefficient") <= _COEFFICIENTS[1]:
+            raise InvalidValueError(
+                f"wear coefficient: expected {' to '.join(f'{end * 1e9:g}' for end in _COEFFICIENTS)} mm³/(N m), got "
+                f"{self.median * 1e9:g}"
+            )
+        if not_negative(self.spread, "spread of the wear coefficient") > _WIDEST:
+            raise InvalidValueError(
+                f"spread of the wear coefficient: expected at most {_WIDEST:g}, got {self.spread:g}"
+            )
         if not (self.growth.lengths[-1] > 0).any():
             raise InvalidValueError(f"{self.linkage.name}: nothing wears")
 
@@ -146,7 +158,7 @@ class WearingLinkage:
 
     def coefficients(self, z: Array) -> Array:
         """Return (n, m) wear coefficients of their pins [m²/N]."""
-        logs = self.spread * z[:, len(self.random.names) :]
+        logs = np.minimum(self.spread * z[:, len(self.random.names) :], LARGEST_LOG)
         return np.broadcast_to(self.median * np.exp(logs), (len(z), len(self.linkage.pins)))
 
     def worn_clearances(self, z: Array, strokes: Array) -> Array:

@@ -30,7 +30,8 @@ _SCHEMA = Schema(
 )
 # Accuracy and repeatability at the worst pose.
 TIP_MEASURES = ("AP", "RP")
-_MOST_STROKES, _LARGEST = 1e15, 1.0
+# Strokes of a life at most, and the largest length that is measured [m].
+MOST_STROKES, _LARGEST = 1e15, 1.0
 
 
 class WearMeasurement(NamedTuple):
@@ -80,8 +81,8 @@ def read_wear_measurements(
             near = closest(name, known)
             hint = f"; did you mean '{near}'?" if near else ""
             raise table.error(row, "measure", f"expected one of {', '.join(known)}, got {shown(name)}{hint}")
-        if not 0 <= strokes <= _MOST_STROKES:
-            raise table.error(row, "strokes", f"expected 0 to {_MOST_STROKES:g}, got {strokes:g}")
+        if not 0 <= strokes <= MOST_STROKES:
+            raise table.error(row, "strokes", f"expected 0 to {MOST_STROKES:g}, got {strokes:g}")
         if not 0 <= value <= _LARGEST:
             raise table.error(row, "value", f"expected 0 to {_LARGEST * 1e3:g} mm, got {value * 1e3:g} mm")
         if not 0 < error <= _LARGEST:

@@ -81,6 +81,7 @@ def curves(
     y_label: str,
     spans: Sequence[tuple[float, float]] = (),
     fits: Mapping[str, tuple[Array, Array]] | None = None,
+    logarithmic: bool = False,
 ) -> str:
     """Draw curves over a common axis, with shaded intervals and fitted straight lines.
 
@@ -92,6 +93,7 @@ def curves(
         y_label: quantity and unit of the curves.
         spans: bounds of the shaded intervals.
         fits: abscissae (k,) and values (k,) of lines over the curves, by name.
+        logarithmic: whether the axis of the curves is.
 
     Returns:
         An SVG file's text.
@@ -104,6 +106,8 @@ def curves(
         axes.plot(abscissae, values, "k--", label=plain_label(name), linewidth=1.4)
     for low, high in spans:
         axes.axvspan(low, high, color="0.88", zorder=0)
+    if logarithmic:
+        axes.set_yscale("log")
     axes.set(title=figure_title(figure, title), xlim=(float(x[0]), float(x[-1])))
     if len(axes.lines) > 1:
         axes.legend()

@@ -37,6 +37,7 @@ _STUDIES = {
     "dh-calibration": ("dh_calibration_study", "DhCalibration"),
     "five-bar-life": ("five_bar_life", "FiveBarLife"),
     "identified-arm": ("identified_arm", "IdentifiedArm"),
+    "linkage-simulators": ("linkage_simulators", "LinkageSimulators"),
 }
 STUDIES = tuple(_STUDIES)
 

@@ -142,6 +142,10 @@ class CheckPlan:
             ],
             "change_now": list(self.due),
             "next_check": finite_or_none(self.next_stop.strokes),
+            "out_of_limit": {
+                "strokes": self.next_stop.times.tolist(),
+                "probabilities": self.next_stop.probabilities.tolist(),
+            },
             "poses": [{"tip": tip.tolist(), "drives": drives.tolist()} for tip, drives in self.poses()],
             "corrections": [
                 {"strokes": n, "clearances": dict(zip(self.pins, c.tolist(), strict=True))}
@@ -245,20 +249,21 @@ class CheckPlan:
         )
         yield ResultTable(
             title=f"Simulated lives until {self.planner.strategy.horizon:.4g} strokes",
-            heads=("checks", "interval", "stops", "±", "changes", "out of limit %", "±"),
+            heads=("checks", "interval", "stops", "±", "corrections", "changes", "out of limit %", "±"),
             rows=[
                 (
                     "plan" if one.checks is None else str(one.checks),
                     "" if one.checks is None else f"{one.strokes / (one.checks + 1):.3g}",
                     f"{one.stops.mean():.2f}",
                     f"{standard_error(one.stops):.2f}",
+                    f"{one.corrections.mean():.1f}",
                     f"{one.changes.mean():.2f}",
                     f"{one.outside.mean() * 100:.3f}",
                     f"{standard_error(one.outside) * 100:.3f}",
                 )
                 for one in (self.planned, *self.fixed)
             ],
-            numbers=range(1, 7),
+            numbers=range(1, 8),
         )
 
     def _days(self, strokes: float) -> str:
@@ -320,6 +325,12 @@ def plan_checks(
     if now > belief.strokes:
         history.append(belief.at(now, rng))
     fresh, due, stop = planner.changes(history[-1], rng)
+    if stop.strokes < now + strategy.soonest:
+        raise InvalidValueError(
+            f"limit: {strategy.limit * 1e3:g} mm cannot be kept: a check would be due after {stop.strokes - now:.3g} "
+            f"strokes, with all corrections and changes; expected {strategy.soonest:.3g} or more, a tenth of the least "
+            f"interval"
+        )
     planned, *fixed = compare_ways(planner, history[-1], lives, seed, progress)
     return CheckPlan(
         planner=planner,

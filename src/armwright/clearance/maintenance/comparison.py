@@ -42,6 +42,11 @@ class Maintained:
         return np.array([life.outside / self.strokes for life in self.lives])
 
     @property
+    def corrections(self) -> Array:
+        """(l,) number of corrected paths of each life."""
+        return np.array([float(life.corrections) for life in self.lives])
+
+    @property
     def changes(self) -> Array:
         """(l,) number of changed bearings of each life."""
         return np.array([float(sum(len(stop.changed) for stop in life.stops)) for life in self.lives])
@@ -59,7 +64,12 @@ class Maintained:
             "interval": None if self.checks is None else self.strokes / (self.checks + 1),
             **{
                 name: {"mean": float(values.mean()), "standard_error": standard_error(values)}
-                for name, values in (("stops", self.stops), ("changes", self.changes), ("outside", self.outside))
+                for name, values in (
+                    ("stops", self.stops),
+                    ("corrections", self.corrections),
+                    ("changes", self.changes),
+                    ("outside", self.outside),
+                )
             },
             "covered": self.covered,
         }

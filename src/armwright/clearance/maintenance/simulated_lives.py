@@ -34,6 +34,8 @@ _ROUNDS = 3
 # Of the posterior of the wear coefficients.
 _LEVEL = 0.9
 _MOST_LIVES = 10_000
+# After so many stops they help no longer: then they are at least intervals apart.
+_MANY = 30
 # What is so near to the horizon is at it, but for rounding.
 _END = 1 - 1e-9
 
@@ -113,8 +115,8 @@ def simulate_lives(
             life.next_stop.strokes if interval is None else min(life.now + interval, life.next_stop.change)
             for life in active
         ]
-        # Two stops at one moment are one.
-        soonest = np.array([life.now for life in active]) + strategy.least_interval / 10
+        spaces = [strategy.soonest if len(life.stops) < _MANY else strategy.least_interval for life in active]
+        soonest = np.array([life.now for life in active]) + spaces
         ends = np.minimum(np.maximum(due, soonest), strategy.horizon)
         ends[ends > _END * strategy.horizon] = strategy.horizon
         outside = truth.run(rows, active, ends, strategy.limit)

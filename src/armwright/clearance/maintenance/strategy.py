@@ -28,7 +28,7 @@ _DRIFT_SHARE = 0.2
 _COARSE, _FINE = 12, 8
 # Corrections in a horizon at most, and strokes at which the mean drift is computed.
 _MOST_CORRECTIONS, _DRIFT_POINTS = 500, 40
-_LEAST_ALPHA, _MOST_STOPS = 1e-3, 1000
+_LEAST_ALPHA, _MOST_STOPS, _MOST_READINGS = 1e-3, 1000, 1000
 
 
 @attrs.frozen(kw_only=True)
@@ -59,7 +59,8 @@ class Strategy:
         positive(self.horizon, "horizon", "strokes")
         positive(self.least_interval, "least interval", "strokes")
         positive(self.noise, "noise", "m")
-        integer(self.readings, "readings", least=1)
+        if integer(self.readings, "readings", least=1) > _MOST_READINGS:
+            raise InvalidValueError(f"readings: expected 1 to {_MOST_READINGS}, got {self.readings}")
         if not _LEAST_ALPHA <= not_negative(self.alpha, "alpha") <= 0.5:
             raise InvalidValueError(f"alpha: expected {_LEAST_ALPHA:g} to 0.5, got {self.alpha:g}")
         if self.horizon / self.least_interval > _MOST_STOPS:
@@ -73,6 +74,11 @@ class Strategy:
             )
         if not self.change_at > 0:
             raise InvalidValueError(f"change at: expected a clearance above 0, got {self.change_at * 1e3:g} mm")
+
+    @property
+    def soonest(self) -> float:
+        """Strokes that lie between two stops at least."""
+        return self.least_interval / 10
 
 
 class Corrections(NamedTuple):
@@ -149,9 +155,8 @@ class Planner:
         drift = np.maximum.accumulate(np.linalg.norm(shifts, axis=-1).max(axis=-1))
         step = 2 * _DRIFT_SHARE * self.strategy.limit
         count = min(int(drift[-1] / step) + 1, _MOST_CORRECTIONS)
-        # Where the drift stands still its inverse has no value; the last of equal ones is taken.
+        # Where the drift stands still its inverse has no value.
         rising = np.append(True, np.diff(drift) > 0)
-
         starts, middles = (
             np.interp(step * (np.arange(count) + part), drift[rising], times[rising]) for part in (0.0, 0.5)
         )
@@ -170,8 +175,7 @@ class Planner:
         """Return when the next check is due; at the latest when a mean clearance reaches that of a change."""
         strategy, now = self.strategy, belief.strokes
         corrections = self.corrections(belief)
-        least = strategy.least_interval / 10
-        if now + least >= strategy.horizon:
+        if now + strategy.soonest >= strategy.horizon:
             return NextStop(
                 strokes=np.inf,
                 change=np.inf,
@@ -179,7 +183,7 @@ class Planner:
                 times=np.array([now]),
                 probabilities=np.zeros(1),
             )
-        times = now + np.append(0.0, np.geomspace(least, strategy.horizon - now, _COARSE))
+        times = now + np.append(0.0, np.geomspace(strategy.soonest, strategy.horizon - now, _COARSE))
         probabilities = self.probabilities(belief, corrections, times)
         over = np.flatnonzero(probabilities >= strategy.alpha)
         due = np.inf
@@ -224,7 +228,9 @@ class Planner:
             for pin in set(range(len(beyond))) - set(changed):
                 other = belief.with_new_bearing(pin, rng)
                 tried[pin] = other, self.next_stop(other)
-            better = {pin: result for pin, result in tried.items() if result[1].strokes > stop.strokes}
+            # What helps for less than two stops lie apart may be chance.
+            least = stop.strokes + strategy.soonest
+            better = {pin: result for pin, result in tried.items() if result[1].strokes > least}
             if not better:
                 break
             pin = max(better, key=lambda k: better[k][1].strokes)
