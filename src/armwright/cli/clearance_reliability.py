@@ -92,7 +92,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     strokes: Annotated[
         float | None, Option(help="Strokes after which the probability of an error beyond --limit is asked for.")
     ] = None,
-    measured: Annotated[
+    measurements: Annotated[
         Path | None, Option(help="Table of strokes, measure (a pin, AP, RP), value_mm, standard_error_mm.")
     ] = None,
     columns: ColumnMap = None,
@@ -106,7 +106,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     The clearances are random, stated or estimated; all other dimensions may be, too. Printed are the probability
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
-    which pin counts most. Measurements of the worn linkage (--measured) update both. With -o, report.html shows the
+    which pin counts most. Measurements of the worn linkage (--measurements) update both. With -o, report.html shows the
     curves with their bands.
 
     **Example:** `armwright clearance reliability five-bar --pose -180,-600 --clearance J2=0.328 --limit 0.9`
@@ -143,11 +143,11 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             steps=steps,
             limits={name: value * 1e-3 for name, value in limits.items() if value is not None},
             after=strokes,
-            file=measured,
+            file=measurements,
             columns=columns_of(columns),
             skip_incomplete=skip_incomplete,
         )
-    elif measured is not None or limit_rp is not None or strokes is not None:
+    elif measurements is not None or limit_rp is not None or strokes is not None:
         raise usage_error("--k", "strokes, measurements and a limit of RP need the wear coefficient, --k")
     with waiting("linkages", quiet=quiet or as_json) as progress:
         assessment = assess_linkage(

@@ -189,7 +189,7 @@ class CheckPlan:
             )
         same = self.equally_safe()
         if not self.planned.outside.any():
-            notes.append("no simulated stroke was out of limit; more lives (--simulate) compare the ways better")
+            notes.append("no simulated stroke was out of limit; more lives (--lives) compare the ways better")
         elif same is None:
             notes.append(
                 f"none of the fixed intervals with up to {self.fixed[-1].checks} checks is as safe as the plan"
