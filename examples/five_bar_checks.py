@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from armwright.clearance import load_linkage, named_path
+from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
 from armwright.clearance.maintenance.simulated_lives import leaning_tips
-from armwright.clearance.maintenance.wearing_linkage import wearing_linkage
 
 STROKES = (1.6e6, 6.0e6)
 NEW = np.array([0.108e-3, 0.095e-3, 0.102e-3])  # clearances of J2, J3 and J4 [m]
@@ -20,7 +20,7 @@ READINGS, NOISE = 5, 10e-6
 
 bar = load_linkage("five-bar")
 bar = bar.with_clearances(dict.fromkeys(bar.clearances, 0.1e-3))
-machine = wearing_linkage(bar, named_path("pick-and-place"), exposure=2e-6)
+machine = maintained_linkage(bar, named_path("pick-and-place"), exposure=2e-6)
 poses, rng = machine.poses, np.random.default_rng(3)
 drives = poses.q[:, list(bar.driven)]
 with Path(sys.argv[1]).open("w", encoding="utf-8", newline="") as file:

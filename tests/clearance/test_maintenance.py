@@ -13,9 +13,9 @@ from armwright.clearance.maintenance.assessment import learn, plan_checks
 from armwright.clearance.maintenance.belief import Belief, Measured, WearPrior
 from armwright.clearance.maintenance.check_file import ClearanceCheck, read_checks
 from armwright.clearance.maintenance.comparison import compare_ways
+from armwright.clearance.maintenance.maintained_linkage import GrowthTable, MaintainedLinkage, maintained_linkage
 from armwright.clearance.maintenance.simulated_lives import coupled_rates, leaning_tips
 from armwright.clearance.maintenance.strategy import Planner, Strategy, read_offsets
-from armwright.clearance.maintenance.wearing_linkage import GrowthTable, WearingLinkage, wearing_linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.static_equilibrium import find_static_equilibrium
@@ -34,8 +34,8 @@ def five_bar() -> Linkage:
 
 
 @pytest.fixture(scope="module")
-def machine(five_bar: Linkage) -> WearingLinkage:
-    return wearing_linkage(five_bar, named_path("pick-and-place"), exposure=HORIZON * prior().fastest)
+def machine(five_bar: Linkage) -> MaintainedLinkage:
+    return maintained_linkage(five_bar, named_path("pick-and-place"), exposure=HORIZON * prior().fastest)
 
 
 def prior(pins: int = 3, **changes: float) -> WearPrior:
@@ -131,7 +131,7 @@ def test_growth_of_a_table() -> None:
     assert table.grown(np.array([3e-4]), np.array([1e-7]))[0] == pytest.approx(3.6e-4, rel=1e-9)
 
 
-def test_next_check_of_one_lognormal_rate(machine: WearingLinkage) -> None:
+def test_next_check_of_one_lognormal_rate(machine: MaintainedLinkage) -> None:
     """Without a correction that helps, a check is due at the quantile of the lognormal rate that alpha asks for."""
     # One correction only, for the first clearances: what grows after is the error.
     quiet = attrs.evolve(machine, table=steady(pins=3), cone=0.0, aim=np.zeros_like(machine.aim))
@@ -146,7 +146,7 @@ def test_next_check_of_one_lognormal_rate(machine: WearingLinkage) -> None:
     assert due == pytest.approx(2e-4 / 300 / (1e-13 * np.exp(0.5 * norm.ppf(0.9))), rel=0.05)
 
 
-def test_bearing_that_wears_fastest_is_changed(machine: WearingLinkage) -> None:
+def test_bearing_that_wears_fastest_is_changed(machine: MaintainedLinkage) -> None:
     """A bearing whose clearance has grown beyond that of a change is due, and no other one."""
     known = prior()
     belief = Belief.new(known, machine.table, np.random.default_rng(7))
@@ -160,7 +160,7 @@ def test_bearing_that_wears_fastest_is_changed(machine: WearingLinkage) -> None:
     assert after.clearances[:, 2].mean() == pytest.approx(1e-4, abs=3e-6)
 
 
-def test_readings_tell_the_clearances(machine: WearingLinkage) -> None:
+def test_readings_tell_the_clearances(machine: MaintainedLinkage) -> None:
     """Equations of readings hold for the full equilibrium of other clearances, to what is of second order in these."""
     c, believed = np.array([3.1e-4, 1.4e-4, 2.2e-4]), np.full((1, 3), 2e-4)
     offsets = find_static_equilibrium(machine.linkage, machine.poses.q, c).tip - machine.poses.tip
@@ -170,7 +170,7 @@ def test_readings_tell_the_clearances(machine: WearingLinkage) -> None:
     np.testing.assert_allclose(check.design @ c, check.values, atol=5e-7)
 
 
-def test_truth_without_friction_is_the_static_equilibrium(machine: WearingLinkage) -> None:
+def test_truth_without_friction_is_the_static_equilibrium(machine: MaintainedLinkage) -> None:
     """The simulated linkage at rest, its journals untilted, is at the static equilibrium."""
     poses, c = machine.poses, np.array([3.1e-4, 1.4e-4, 2.2e-4])
     drives = poses.q[:, list(machine.linkage.driven)]
@@ -181,7 +181,7 @@ def test_truth_without_friction_is_the_static_equilibrium(machine: WearingLinkag
     np.testing.assert_allclose(tips, find_static_equilibrium(machine.linkage, poses.q, c).tip, atol=3e-6)
 
 
-def test_coupled_growth_is_near_the_table(machine: WearingLinkage) -> None:
+def test_coupled_growth_is_near_the_table(machine: MaintainedLinkage) -> None:
     """Growth by forces and slips of all clearances together differs from the table by percents, and not by nothing."""
     c = np.array([4e-4, 1.2e-4, 1.5e-4])
     tabulated = [np.interp(c[i], machine.table.clearances[:, i], machine.table.rates[:, i]) for i in range(3)]
@@ -192,7 +192,7 @@ def test_coupled_growth_is_near_the_table(machine: WearingLinkage) -> None:
     assert np.abs(ratio - 1).max() > 1e-3
 
 
-def test_lives_after_the_plan(machine: WearingLinkage, sample: Sample) -> None:
+def test_lives_after_the_plan(machine: MaintainedLinkage, sample: Sample) -> None:
     """200 lives: strokes out of limit stay below alpha, intervals of k hold it, and equal distances take more stops.
 
     The seed was written down before the first run. The lives differ from what the filter assumes: full equilibria,
@@ -227,7 +227,7 @@ def test_lives_after_the_plan(machine: WearingLinkage, sample: Sample) -> None:
     assert plan.stops.mean() < same.stops.mean()
 
 
-def test_check_that_nobody_expected(machine: WearingLinkage) -> None:
+def test_check_that_nobody_expected(machine: MaintainedLinkage) -> None:
     """A clearance that no wear explains contradicts what was believed; after a change of bearing it does not."""
     grown = ClearanceCheck(
         strokes=1e7, pins=(0, 1, 2), clearances=np.array([5e-4, 1.2e-4, 5e-4]), deviations=np.full(3, 5e-6)
@@ -246,13 +246,13 @@ def test_check_that_nobody_expected(machine: WearingLinkage) -> None:
     assert low < 1.02e-4 < high
 
 
-def test_limit_that_no_plan_keeps(machine: WearingLinkage) -> None:
+def test_limit_that_no_plan_keeps(machine: MaintainedLinkage) -> None:
     """Where new bearings alone scatter beyond the limit, no check could help, and the plan says so."""
     with pytest.raises(InvalidValueError, match=r"limit: 0.1 mm cannot be kept: a check would be due after 0 strokes"):
         plan_checks(machine, prior(clearance_spread=2e-4), strategy())
 
 
-def test_file_of_clearances(machine: WearingLinkage, tmp_path: Path) -> None:
+def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
     """Clearances of a file, in its unit, are measured values; a name that is no pin's is refused with its line."""
     file = tmp_path / "measured.csv"
     file.write_text("strokes,pin,clearance_um,deviation_um\n4e6,J2,190,4\n2e6,J2,160,4\n2e6,J4,170,5\n")
@@ -292,6 +292,6 @@ def test_what_cannot_be_maintained(five_bar: Linkage) -> None:
     tight = five_bar.with_clearances(dict.fromkeys(five_bar.clearances, 0.0))
     path = named_path("pick-and-place")
     with pytest.raises(InvalidValueError, match="wear needs them above 0"):
-        wearing_linkage(tight, path, exposure=1e-6)
+        maintained_linkage(tight, path, exposure=1e-6)
     with pytest.raises(InvalidValueError, match="poses: expected 1 to 6, got 9"):
-        wearing_linkage(five_bar, path, exposure=1e-6, poses=9)
+        maintained_linkage(five_bar, path, exposure=1e-6, poses=9)

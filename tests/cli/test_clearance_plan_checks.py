@@ -9,8 +9,8 @@ from cli_calls import armwright, check_mistake
 
 CHECKS = str(Path(__file__).parents[2] / "examples" / "five_bar_checks.csv")
 NEW = ("--clearance", "J2=0.1", "--clearance", "J3=0.1", "--clearance", "J4=0.1")
-BAR = ("five-bar", "--path", "pick-and-place", "--k", "1e-4", "--limit-mm", "0.1", *NEW)
-SMALL = ("--horizon", "1.2e7", "--simulate", "2", "--json")
+BAR = ("five-bar", "--path", "pick-and-place", "--k", "1e-4", "--limit", "0.1", *NEW)
+SMALL = ("--horizon", "1.2e7", "--lives", "2", "--json")
 
 
 def test_plan_after_two_checks(tmp_path: Path) -> None:
@@ -37,7 +37,7 @@ def test_plan_after_two_checks(tmp_path: Path) -> None:
 def test_plan_of_a_crank() -> None:
     """A linkage with a single drive has a plan for its one pin, with poses of its crank, that keeps the limit."""
     done = armwright(
-        "clearance", "plan-checks", "four-bar", "--speed-rpm", "60", "--k", "1e-6", "--limit-mm", "1.0", *SMALL
+        "clearance", "plan-checks", "four-bar", "--speed-rpm", "60", "--k", "1e-6", "--limit", "1.0", *SMALL
     )  # fmt: skip
 
     data = json.loads(done.stdout)

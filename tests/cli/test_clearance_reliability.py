@@ -36,7 +36,7 @@ def test_life_of_the_four_bar(tmp_path: Path) -> None:
     file.write_text("strokes,measure,value_mm,standard_error_mm\n1e6,B,0.501,0.001\n", encoding="utf-8")
     wear = ("--k", "1e-5", "--arc-rad", "1", "--limit", "3")
     done = armwright(
-        "clearance", "reliability", *SMALL, *wear, "--measured", str(file), "--json", "-o", str(tmp_path / "out")
+        "clearance", "reliability", *SMALL, *wear, "--measurements", str(file), "--json", "-o", str(tmp_path / "out")
     )
 
     data = json.loads(done.stdout)

@@ -4,6 +4,7 @@ from .estimation.static_estimate import Estimate as Estimate, estimate_at_rest a
 from .linkage import Linkage as Linkage
 from .natural_modes import NaturalModes as NaturalModes, natural_modes as natural_modes
 from .paths import named_path as named_path, thesis_path as thesis_path
+from .poses import closed_along as closed_along, closed_at as closed_at
 from .reader import linkage_names as linkage_names, load_linkage as load_linkage
 from .scenario import Scenario as Scenario, prepare_scenario as prepare_scenario
 from .sensitivities import RestSensitivities as RestSensitivities, rest_sensitivities as rest_sensitivities

@@ -201,6 +201,25 @@ def effects(placement: Placement) -> Array:
     return A
 
 
+def gap_derivatives(placement: Placement) -> Array:
+    """Return (..., 2 p, n) the derivatives of the gaps, from bearing to journal, by the coordinates."""
+    return _derivatives(placement, [_gap(placement, i) for i in range(len(placement.linkage.pins))])
+
+
+def point_derivatives(placement: Placement, point: BodyPoint) -> Array:
+    """Return (..., 2, n) the derivatives of a point of a body by the coordinates."""
+    return _derivatives(placement, [placement.point(point)])
+
+
+def mass_matrices(placement: Placement) -> Array:
+    """Return (..., n, n) the mass matrix of the linkage in its coordinates."""
+    n = len(placement.q)
+    M = np.zeros((*np.shape(placement.q[0]), n, n))
+    for (i, j), entry in mass_matrix(placement).items():
+        M[..., i, j] = M[..., j, i] = entry
+    return M
+
+
 def tip_position(linkage: Linkage, q: Array) -> Array:
     """Return (..., 2) the position of the tip [m] at coordinates (..., n)."""
     return point_position(linkage, linkage.tip, q)
@@ -239,8 +258,7 @@ def tip_sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
     placement = place_bodies(linkage, q)
     A = closure(placement, by_tip=False)
     inverse = solve_columns(A, np.eye(q.shape[-1])[:, : 2 * p])
-    tip = _jacobian(lead, [placement.point(linkage.tip)], q.shape[-1])
-    return (tip @ inverse).reshape(*lead, 2, p, 2)
+    return (point_derivatives(placement, linkage.tip) @ inverse).reshape(*lead, 2, p, 2)
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
@@ -294,9 +312,9 @@ def closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of t
     """Return the partial derivatives of gaps and tip, or of gaps and driven coordinates."""
     linkage, n = placement.linkage, len(placement.q)
     lead = np.shape(placement.q[0])
-    rows = [_jacobian(lead, [_gap(placement, i) for i in range(len(linkage.pins))], n)]
+    rows = [gap_derivatives(placement)]
     if by_tip:
-        rows.append(_jacobian(lead, [placement.point(linkage.tip)], n))
+        rows.append(point_derivatives(placement, linkage.tip))
     else:
         rows.append(np.broadcast_to(np.eye(n)[list(linkage.driven)], (*lead, len(linkage.drives), n)))
     A = np.concatenate(rows, axis=-2)
@@ -309,8 +327,8 @@ def closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of t
     return A
 
 
-def _jacobian(lead: tuple[int, ...], points: Sequence[Point], n: int) -> Array:
-    J = np.zeros((*lead, 2 * len(points), n))
+def _derivatives(placement: Placement, points: Sequence[Point]) -> Array:
+    J = np.zeros((*np.shape(placement.q[0]), 2 * len(points), len(placement.q)))
     for k, point in enumerate(points):
         for i, partial in point.partials.items():
             J[..., 2 * k, i], J[..., 2 * k + 1, i] = partial

@@ -10,8 +10,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
-from armwright.clearance.equations import free_forces, mass_matrix
-from armwright.clearance.ideal import closure, effects, place_bodies, solve, solve_columns, stack
+from armwright.clearance.equations import free_forces
+from armwright.clearance.ideal import closure, effects, mass_matrices, place_bodies, solve, solve_columns, stack
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError
 
@@ -56,10 +56,8 @@ def natural_modes(linkage: Linkage, q: ArrayLike) -> NaturalModes:
     displaced = _DIFFERENCE * np.swapaxes(Z, -1, -2)
     above, below = (_forces(linkage, q[..., None, :] + side * displaced, loads[..., None, :]) for side in (1, -1))
     K = -(above - below) @ Z / (2 * _DIFFERENCE)
-    M = np.zeros((*lead, n, n))
-    for (i, j), entry in mass_matrix(placement).items():
-        M[..., i, j] = M[..., j, i] = entry
-    inverse = np.linalg.inv(np.linalg.cholesky(np.swapaxes(Z, -1, -2) @ M @ Z))
+    M = np.swapaxes(Z, -1, -2) @ mass_matrices(placement) @ Z
+    inverse = np.linalg.inv(np.linalg.cholesky(M))
     squares, vectors = np.linalg.eigh(inverse @ ((K + np.swapaxes(K, -1, -2)) / 2) @ np.swapaxes(inverse, -1, -2))
     if not np.all(squares > 0):
         raise InvalidValueError(f"{linkage.name} is not stable in this configuration: a rod buckles")

@@ -14,7 +14,7 @@ import numpy as np
 from armwright.arrays import Array, ArrayLike, integer, of_shape
 from armwright.clearance.estimation.static_estimate import closed_at_poses
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS, named_path
+from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS, Path as TipPath, named_path
 from armwright.clearance.scenario import assembly_guess, close_pins_along
 from armwright.errors import InvalidValueError, counted, one_of
 from armwright.files.column_names import ANGLE, LENGTH, Column, Schema
@@ -32,6 +32,7 @@ _SCHEMA = Schema(
 )
 # Drives reach a pose in steps of this at most, so that the linkage does not jump to another assembly [rad, m].
 _STEP = 0.1
+_MOST_POSES = 1000
 
 
 def pose_size(linkage: Linkage) -> int:
@@ -75,19 +76,34 @@ def closed_at(linkage: Linkage, poses: ArrayLike) -> Array:
     return np.array(found)
 
 
+def closed_along(linkage: Linkage, path: TipPath, count: int) -> Array:
+    """Return (count, n) coordinates with closed pins along a path, evenly spread in time.
+
+    Args:
+        linkage: with n coordinates.
+        path: that its tip or its drives follow.
+        count: 2 to 1000.
+
+    Raises:
+        InvalidValueError: the count is out of its range, or the path cannot be followed.
+    """
+    goals = path.evaluate(path.duration * _spread(count)).position
+    return close_pins_along(linkage, goals, assembly_guess(linkage), by_tip=path.follower == "tip")
+
+
 def poses_on_path(linkage: Linkage, name: str, count: int) -> Array:
     """Return (count, 2) positions along a path, or (count, 1) coordinates of the only drive, evenly spread in time.
 
     Args:
         linkage: with one or two drives.
         name: of the path; ``turn`` is the only one of a single drive, which must rotate.
-        count: 2 or more.
+        count: 2 to 1000.
 
     Raises:
         UnknownNameError: the linkage has no such path.
-        InvalidValueError: the only drive slides.
+        InvalidValueError: the count is out of its range, or the only drive slides.
     """
-    times = np.linspace(0.0, 1.0, integer(count, "poses on the path", least=2))
+    times = _spread(count)
     if pose_size(linkage) == 2:
         path = named_path(one_of("path", name, (*TEST_PATHS, PICK_AND_PLACE)))
         return path.evaluate(path.duration * times).position
@@ -95,6 +111,13 @@ def poses_on_path(linkage: Linkage, name: str, count: int) -> Array:
     if linkage.coordinates[linkage.driven[0]].kind != "angle":
         raise InvalidValueError(f"{linkage.name}: its drive slides and has no turn; specify single poses")
     return linkage.assembly.get(linkage.drives[0].body, 0.0) + 2 * math.pi * times[:, None]
+
+
+def _spread(count: int) -> Array:
+    """Return (count,) parts of a path, from 0 to 1."""
+    if integer(count, "poses on the path", least=2) > _MOST_POSES:
+        raise InvalidValueError(f"poses on the path: expected 2 to {_MOST_POSES}, got {count}")
+    return np.linspace(0.0, 1.0, count)
 
 
 def read_poses(

@@ -30,7 +30,7 @@ from armwright.clearance.dimensions import (
 )
 from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.equations import drive_weights
-from armwright.clearance.ideal import inverse_dynamics
+from armwright.clearance.ideal import gap_derivatives, inverse_dynamics, place_bodies, point_derivatives
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement, Point, Vec2
 from armwright.clearance.static_equilibrium import find_static_equilibrium, force_magnitudes
@@ -106,7 +106,7 @@ def rest_sensitivities(
         raise InvalidValueError(
             f"{linkage.name} is in a singular configuration, where its tip may go anywhere"
         ) from error
-    tip = _rows(_place(linkage, rest.q).point(linkage.tip), rest.q.shape)
+    tip = point_derivatives(place_bodies(linkage, rest.q), linkage.tip)
     return RestSensitivities(
         dimensions=dimensions_of(linkage),
         tip=rest.tip,
@@ -115,19 +115,6 @@ def rest_sensitivities(
 
 
 # ---- the equations of rest -----------------------------------------------------------------------------------------
-
-
-def _place(linkage: Linkage, q: Array, speeds: Array | None = None) -> Placement:
-    qd = [0.0] * q.shape[-1] if speeds is None else list(np.moveaxis(speeds, -1, 0))
-    return Placement(linkage, list(np.moveaxis(q, -1, 0)), qd)
-
-
-def _rows(point: Point, shape: tuple[int, ...]) -> Array:
-    """Return (..., 2, n) the partial derivatives of a point by coordinates of a shape (..., n)."""
-    rows = np.zeros((*shape[:-1], 2, shape[-1]))
-    for i, partial in point.partials.items():
-        rows[..., 0, i], rows[..., 1, i] = partial
-    return rows
 
 
 def _pushed(placement: Placement, reactions: Array) -> Iterator[tuple[Point, Vec2]]:
@@ -151,17 +138,16 @@ def _equations(linkage: Linkage, q: Array, reactions: Array, clearances: Array, 
     driven coordinates.
     """
     n, p, d = len(linkage.coordinates), len(linkage.pins), len(linkage.drives)
-    placement = _place(linkage, q)
+    gaps = gap_derivatives(place_bodies(linkage, q))
     A = np.zeros((*q.shape[:-1], n + 2 * p + d, n + d + 2 * p))
     A[..., :n, :n] = _force_slopes(linkage, q, reactions)
     for k, drive in enumerate(linkage.drives):
         for i, weight in drive_weights(linkage, drive.body).items():
             A[..., i, n + k] = weight
-    for k, pin in enumerate(linkage.pins):
-        gap = _rows(placement.point(pin.journal), q.shape) - _rows(placement.point(pin.bearing), q.shape)
+    A[..., n : n + 2 * p, :n] = gaps
+    A[..., :n, n + d :] = -np.swapaxes(gaps, -1, -2)
+    for k in range(p):
         rows, columns = slice(n + 2 * k, n + 2 * k + 2), slice(n + d + 2 * k, n + d + 2 * k + 2)
-        A[..., rows, :n] = gap
-        A[..., :n, columns] = -np.swapaxes(gap, -1, -2)
         force = np.linalg.norm(reactions[..., k, :], axis=-1)[..., None, None]
         direction = reactions[..., k, :, None] / force
         along = direction * np.swapaxes(direction, -1, -2)
@@ -186,7 +172,7 @@ def _force_slopes(linkage: Linkage, q: Array, reactions: Array) -> Array:
     lead = q.shape[:-1]
     speeds = speeds.reshape(len(first), *[1] * len(lead), n)
     forms = np.zeros((len(first), *lead))
-    for point, force in _pushed(_place(linkage, q[None], speeds), reactions[None]):
+    for point, force in _pushed(place_bodies(linkage, q[None], speeds), reactions[None]):
         forms += point.bias.dot(force)
     slopes = np.zeros((*lead, n, n))
     for form, i, j in zip(forms, first, second, strict=True):
@@ -199,7 +185,7 @@ def _force_slopes(linkage: Linkage, q: Array, reactions: Array) -> Array:
 def _right_sides(linkage: Linkage, q: Array, reactions: Array, directions: Array) -> tuple[Array, Array]:
     """Return the derivatives by the dimensions, at fixed coordinates, of the equations (..., m, k), and of the tip."""
     n, p, d = len(linkage.coordinates), len(linkage.pins), len(linkage.drives)
-    lead, placement = q.shape[:-1], _place(linkage, q)
+    lead, placement = q.shape[:-1], place_bodies(linkage, q)
     columns: list[tuple[Array, Array]] = []
 
     def new() -> tuple[Array, Array]:
@@ -237,7 +223,7 @@ def _geometry_slope(linkage: Linkage, change: Change, q: Array, reactions: Array
 def _geometry(linkage: Linkage, q: Array, reactions: Array) -> Array:
     """Return the generalised forces, the gaps and zeros for the drives in the order of the equations, and the tip."""
     n, p, d = len(linkage.coordinates), len(linkage.pins), len(linkage.drives)
-    placement = _place(linkage, q)
+    placement = place_bodies(linkage, q)
     values = np.zeros((*q.shape[:-1], n + 2 * p + d + 2))
     for point, force in _pushed(placement, reactions):
         for i, partial in point.partials.items():

@@ -23,8 +23,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.ideal import place_bodies
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.placement import Placement
 
 # Directions in which a journal may touch the wall beside the one that it is pushed in [rad].
 _BESIDE = 1.4
@@ -187,8 +187,7 @@ def wall_at(table: Array, direction: Array, rotation: Array) -> WallPlace:
 
 def pin_directions(linkage: Linkage, q: Array) -> PinDirections:
     """Return the angles of the bodies at the pins of a linkage at coordinates (..., n)."""
-    columns = [q[..., i] for i in range(q.shape[-1])]
-    placement = Placement(linkage, columns, [0.0] * len(columns))
+    placement = place_bodies(linkage, q)
     bearing, rotation = np.zeros((2, *q.shape[:-1], len(linkage.pins)))
     for i, pin in enumerate(linkage.pins):
         own, other = (placement.frames[end.body].axis for end in (pin.bearing, pin.journal))

@@ -25,7 +25,7 @@ _LEAST_PART = 1 / 50
 def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     k: Annotated[float, Option("--k", help="Median of the wear coefficients in mm³/(N m); take a measured one.")],
-    limit_mm: Annotated[float, Option(help="Limit of the error along the corrected path in mm.")],
+    limit: Annotated[float, Option(help="Limit of the error along the corrected path in mm.")],
     horizon: Annotated[float, Option(help="Strokes until which is planned, counted from the new linkage.")],
     path: Annotated[
         str | None,
@@ -49,7 +49,9 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     clearance: Annotated[
         list[str] | None, Option(help="Radial clearance of a new pin in mm, as in J2=0.1; may be repeated.")
     ] = None,
-    clearance_spread_um: Annotated[float, Option(help="Standard deviation of new clearances in um.")] = 10.0,
+    clearance_sd_mm: Annotated[
+        float, Option("--clearance-sd-mm", help="Standard deviation of new clearances in mm.")
+    ] = 0.01,
     width_mm: Annotated[float, Option(help="Width of the bearings in mm.")] = 20.0,
     bearing_share: Annotated[float, Option(help="Part of the wear that bearings take; journals take the rest.")] = 0.5,
     noise_um: Annotated[float, Option(help="Standard deviation of one coordinate of a reading in um.")] = 10.0,
@@ -73,7 +75,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None, Option(help="Strokes until now; those of the last check or change by default.")
     ] = None,
     strokes_per_day: Annotated[float | None, Option(help="Strokes in a day, to print days.")] = None,
-    simulate: Annotated[int, Option(help="Number of simulated lives, 2 to 10000.")] = 20,
+    lives: Annotated[int, Option(help="Number of simulated lives, 2 to 10000.")] = 20,
     seed: Annotated[int, Option(min=0, help="Seed of all random numbers.")] = 0,
     output: OutputFolder = None,
     as_json: Json = False,
@@ -87,14 +89,14 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     out of limit, and what checks at equal distances would cost. With -o the command writes report.html, plan.json,
     corrections.csv and figures.
 
-    **Example:** `armwright clearance plan-checks five-bar --path pick-and-place --k 1e-4 --limit-mm 0.1 --horizon 2e7`
+    **Example:** `armwright clearance plan-checks five-bar --path pick-and-place --k 1e-4 --limit 0.1 --horizon 2e7`
     """
     import attrs
 
     from armwright.clearance.maintenance.assessment import plan_checks as planned
     from armwright.clearance.maintenance.check_file import PastCheck, read_checks
+    from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
     from armwright.clearance.maintenance.strategy import Strategy
-    from armwright.clearance.maintenance.wearing_linkage import wearing_linkage
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.wear.worn_surfaces import WearLaw
     from armwright.report.check_plan_files import check_plan_files
@@ -108,7 +110,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
         checks = read_checks(measurements, model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     prior = attrs.evolve(
         _prior(model, k, pin_factor or []),
-        clearance_spread=clearance_spread_um * 1e-6,
+        clearance_spread=clearance_sd_mm * 1e-3,
         spread=k_spread,
         pin_spread=pin_spread,
         grain=grain_um * 1e-6,
@@ -116,7 +118,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     changes = named_numbers(changed or [], ("",), "a pin and strokes, J2=2e6", "--changed")
     strategy = Strategy(
-        limit=limit_mm * 1e-3,
+        limit=limit * 1e-3,
         alpha=alpha,
         horizon=horizon,
         least_interval=horizon * _LEAST_PART if least_interval is None else least_interval,
@@ -126,7 +128,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     law = WearLaw(coefficient=1.0, width=width_mm * 1e-3, bearing_share=bearing_share)
     stroke = path_of(model, path, speed_rpm, 1.0)
-    machine = wearing_linkage(model, stroke, law, exposure=horizon * prior.fastest, poses=poses)
+    machine = maintained_linkage(model, stroke, law, exposure=horizon * prior.fastest, poses=poses)
     with counting("lives", quiet=quiet or as_json) as progress:
         plan = planned(
             machine,
@@ -136,7 +138,7 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
             changed={pin: number.value for pin, number in changes.items()},
             strokes=strokes_done,
             strokes_per_day=strokes_per_day,
-            lives=simulate,
+            lives=lives,
             seed=seed,
             progress=progress,
         )

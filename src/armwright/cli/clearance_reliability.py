@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import LinkageName, path_of, with_clearances
-from armwright.cli.numbers import named_numbers, numbers, within
+from armwright.cli.linkages import LinkageName, path_of, poses_of, with_clearances
+from armwright.cli.numbers import named_numbers, within
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from armwright.reliability.linkage_assessment import WearStatement
     from armwright.reliability.linkage_errors import RandomClearances
 
-# Places of a tip and angles of a drive [mm] or [deg].
-_PLACES = -1e5, 1e5
 # Widths of bearings [mm].
 _WIDTHS = 1e-3, 1e4
 # Units of deviations, of which one need not be written.
@@ -42,7 +40,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         ),
     ] = None,
     speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
-    poses: Annotated[int, Option(help="Number of poses along the path, 2 to 1000.")] = 21,
+    poses: Annotated[int, Option(min=2, max=1000, help="Number of poses along the path.")] = 21,
     clearance: Annotated[
         list[str] | None, Option(help="Mean radial clearance of a pin in mm, as in J2=0.34; may be repeated.")
     ] = None,
@@ -92,7 +90,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     strokes: Annotated[
         float | None, Option(help="Strokes after which the probability of an error beyond --limit is asked for.")
     ] = None,
-    measured: Annotated[
+    measurements: Annotated[
         Path | None, Option(help="Table of strokes, measure (a pin, AP, RP), value_mm, standard_error_mm.")
     ] = None,
     columns: ColumnMap = None,
@@ -106,13 +104,14 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     The clearances are random, stated or estimated; all other dimensions may be, too. Printed are the probability
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
-    which pin counts most. Measurements of the worn linkage (--measured) update both. With -o, report.html shows the
+    which pin counts most. Measurements of the worn linkage (--measurements) update both. With -o, report.html shows the
     curves with their bands.
 
     **Example:** `armwright clearance reliability five-bar --pose -180,-600 --clearance J2=0.328 --limit 0.9`
     """
+    from armwright.clearance.poses import closed_along, closed_at
     from armwright.clearance.reader import load_linkage
-    from armwright.reliability.linkage_assessment import assess_linkage, rest_poses
+    from armwright.reliability.linkage_assessment import assess_linkage
     from armwright.report.reliability_files import reliability_files
 
     model = with_clearances(load_linkage(linkage), clearance or [])
@@ -124,8 +123,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         raise usage_error("--strokes", "expected the limit of the error too, --limit MM")
     named = named_numbers(sd or (), _UNITS, "a dimension and its deviation, J2=0.02 or link1.zero=0.01deg", "--sd")
     way = None if path is None and speed_rpm is None else path_of(model, path, speed_rpm, 1.0)
-    places = None if not pose else [_place(model, text) for text in pose]
-    if places is None and way is None:
+    if not pose and way is None:
         raise usage_error("--pose", "expected poses, as --pose X,Y, or those of a path, --path")
     wear = None
     if k is not None:
@@ -143,16 +141,16 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             steps=steps,
             limits={name: value * 1e-3 for name, value in limits.items() if value is not None},
             after=strokes,
-            file=measured,
+            file=measurements,
             columns=columns_of(columns),
             skip_incomplete=skip_incomplete,
         )
-    elif measured is not None or limit_rp is not None or strokes is not None:
+    elif measurements is not None or limit_rp is not None or strokes is not None:
         raise usage_error("--k", "strokes, measurements and a limit of RP need the wear coefficient, --k")
     with waiting("linkages", quiet=quiet or as_json) as progress:
         assessment = assess_linkage(
             model,
-            rest_poses(model, at=places, path=way, count=poses),
+            closed_along(model, way, poses) if way and not pose else closed_at(model, poses_of(model, pose or [])),
             _clearances(
                 model,
                 {name: x.value * 1e-3 for name, x in named.items() if name in model.clearances},
@@ -171,15 +169,6 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         write_results(output, reliability_files(assessment, command=command_line()))
     print_result(assessment, as_json=as_json, quiet=quiet, output=output)
-
-
-def _place(model: "Linkage", text: str) -> list[float]:
-    """Return the position of the tip [m], or the coordinate of the drive of a linkage with one [rad] or [m]."""
-    import math
-
-    turns = len(model.drives) == 1 and model.coordinates[model.driven[0]].kind == "angle"
-    values = numbers(text, len(model.drives), "--pose")
-    return [within(x, _PLACES, "--pose") * (math.radians(1) if turns else 1e-3) for x in values]
 
 
 def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from typer import Argument, Option
 
-from armwright.cli.linkages import LinkageName
-from armwright.cli.numbers import numbers
+from armwright.cli.linkages import LinkageName, poses_of
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
@@ -106,9 +105,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
 
 def _poses(model: "Linkage", single: list[str], path: str | None, count: int, file: TableFile | None) -> "Array":
     """Return the poses of the one option that has them, in SI units."""
-    import numpy as np
-
-    from armwright.clearance.poses import pose_size, poses_on_path, read_poses
+    from armwright.clearance.poses import poses_on_path, read_poses
 
     if bool(single) + (path is not None) + (file is not None) != 1:
         raise usage_error("--pose", "expected the poses, as --pose X,Y, --path NAME or --csv FILE")
@@ -116,7 +113,4 @@ def _poses(model: "Linkage", single: list[str], path: str | None, count: int, fi
         return poses_on_path(model, path, count)
     if file is not None:
         return read_poses(file.path, model, columns=file.columns, skip_incomplete=file.skip_incomplete)
-    size = pose_size(model)
-    values = np.array([numbers(text, size, "--pose") for text in single])
-    rotates = size == 1 and model.coordinates[model.driven[0]].kind == "angle"
-    return np.asarray(np.radians(values) if rotates else values * 1e-3)
+    return poses_of(model, single)

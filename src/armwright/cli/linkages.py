@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from typer import Argument, Option
 
-from armwright.cli.numbers import named_numbers
+from armwright.cli.numbers import named_numbers, numbers, within
 from armwright.cli.options import usage_error
 from armwright.cli.shell_completion import listed_in
 from armwright.errors import InvalidValueError, counted
 
 if TYPE_CHECKING:
+    from armwright.arrays import Array
     from armwright.clearance.contact import FrictionLaw
     from armwright.clearance.equations import SlipSpeed
     from armwright.clearance.linkage import Linkage
@@ -30,6 +31,8 @@ FrictionVelocity: TypeAlias = Annotated[
 ]
 # Drives of the linkages to which an option applies.
 _DRIVES = {"--speed-rpm": 1, "--path": 2}
+# Places of a tip and of a slide [mm], and angles of a drive [deg].
+_PLACES = -1e5, 1e5
 
 Threshold: TypeAlias = Annotated[float, Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")]
 
@@ -58,6 +61,23 @@ def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float
                 f"mm; if micrometres are meant, {c * 1e3:g} µm are {c:g} mm"
             )
     return linkage
+
+
+def poses_of(model: "Linkage", texts: list[str]) -> "Array":
+    """Return the poses of options such as ``-180,-600``: those of ``armwright.clearance.closed_at``.
+
+    Raises:
+        BadParameter: a text is not the position of the tip in mm, or of the only drive in degrees or mm.
+        InvalidValueError: the linkage has neither one drive nor two.
+    """
+    import numpy as np
+
+    from armwright.clearance.poses import pose_size
+
+    size = pose_size(model)
+    rotates = size == 1 and model.coordinates[model.driven[0]].kind == "angle"
+    poses = [[within(x, _PLACES, "--pose") for x in numbers(text, size, "--pose")] for text in texts]
+    return np.array(poses) * (math.radians(1) if rotates else 1e-3)
 
 
 def settings_of(

@@ -24,7 +24,6 @@ from .linkage_assessment import (
     LinkageReliability as LinkageReliability,
     WearStatement as WearStatement,
     assess_linkage as assess_linkage,
-    rest_poses as rest_poses,
 )
 from .linkage_errors import RandomClearances as RandomClearances, RandomLinkage as RandomLinkage
 from .linkage_life import LinkageLife as LinkageLife

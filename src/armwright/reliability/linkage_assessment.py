@@ -20,8 +20,6 @@ from armwright.clearance.dimensions import DimensionUnit, dimensions_of
 from armwright.clearance.ideal import tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
-from armwright.clearance.poses import closed_at
-from armwright.clearance.scenario import assembly_guess, close_pins_along
 from armwright.clearance.wear.life import wear_life
 from armwright.clearance.wear.worn_stroke import Stroke, lean
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
@@ -341,28 +339,6 @@ class LinkageReliability:
         )
 
 
-def rest_poses(linkage: Linkage, *, at: ArrayLike | None = None, path: Path | None = None, count: int = 21) -> Array:
-    """Return (p, n) coordinates with closed pins, at positions or evenly spread in time along a path.
-
-    Args:
-        linkage: with d drives.
-        at: (p, 2) positions of the tip of a linkage with two drives [m], or (p, 1) of the drive of one with one.
-        path: that the tip or the drive follows; without ``at``.
-        count: of the poses along it.
-
-    Raises:
-        InvalidValueError: a pose cannot be reached.
-    """
-    if at is not None:
-        return closed_at(linkage, at)
-    if path is None:
-        raise InvalidValueError("expected positions or a path")
-    if integer(count, "poses", least=2) > _MOST_POSES:
-        raise InvalidValueError(f"poses: expected 2 to {_MOST_POSES}, got {count}")
-    goals = path.evaluate(np.linspace(0.0, path.duration, count)).position
-    return close_pins_along(linkage, goals, assembly_guess(linkage), by_tip=path.follower == "tip")
-
-
 def assess_linkage(
     linkage: Linkage,
     q: ArrayLike,
@@ -380,7 +356,7 @@ def assess_linkage(
 
     Args:
         linkage: with m pins.
-        q: (p, n) coordinates with closed pins, at which the drives are locked; see ``rest_poses``.
+        q: (p, n) coordinates with closed pins, at which the drives are locked; see ``closed_at`` and ``closed_along``.
         clearances: of the m pins.
         deviations: standard deviations of other dimensions by name [m, rad, kg, N].
         friction: whether it holds the journals of the new linkage anywhere in their friction cones.

@@ -19,8 +19,8 @@ from armwright.clearance.elastic_rod import Elasticity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.assessment import CheckPlan, plan_checks
 from armwright.clearance.maintenance.belief import WearPrior
+from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
 from armwright.clearance.maintenance.strategy import Strategy
-from armwright.clearance.maintenance.wearing_linkage import wearing_linkage
 from armwright.clearance.paths import TEST_PATHS, named_path
 from armwright.clearance.poses import closed_at
 from armwright.clearance.reader import load_linkage
@@ -380,7 +380,7 @@ def _plan(arm: Linkage, lives: int, report: Callable[[str, float], None]) -> Che
         pin_spread=0.2,
         grain=1e-6,
     )
-    machine = wearing_linkage(
+    machine = maintained_linkage(
         arm, named_path("pick-and-place"), WearLaw(coefficient=1.0), exposure=HORIZON * prior.fastest
     )
     strategy = Strategy(limit=PLAN_LIMIT, alpha=ALPHA, horizon=HORIZON, least_interval=HORIZON / 50)

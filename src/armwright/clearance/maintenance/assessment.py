@@ -17,8 +17,8 @@ from armwright.clearance.estimation.misfit import CONTRADICTION, p_value
 from armwright.clearance.maintenance.belief import Belief, WearPrior
 from armwright.clearance.maintenance.check_file import PastCheck
 from armwright.clearance.maintenance.comparison import Maintained, compare_ways, standard_error
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
 from armwright.clearance.maintenance.strategy import NextStop, Planner, Strategy
-from armwright.clearance.maintenance.wearing_linkage import WearingLinkage
 from armwright.errors import ContradictionError, InvalidValueError, counted, one_of
 from armwright.files.result_table import ResultTable
 
@@ -79,7 +79,7 @@ class CheckPlan:
     strokes_per_day: float | None
 
     @property
-    def machine(self) -> WearingLinkage:
+    def machine(self) -> MaintainedLinkage:
         """The linkage on its path."""
         return self.planner.machine
 
@@ -189,7 +189,7 @@ class CheckPlan:
             )
         same = self.equally_safe()
         if not self.planned.outside.any():
-            notes.append("no simulated stroke was out of limit; more lives (--simulate) compare the ways better")
+            notes.append("no simulated stroke was out of limit; more lives (--lives) compare the ways better")
         elif same is None:
             notes.append(
                 f"none of the fixed intervals with up to {self.fixed[-1].checks} checks is as safe as the plan"
@@ -278,7 +278,7 @@ class CheckPlan:
 
 
 def plan_checks(
-    machine: WearingLinkage,
+    machine: MaintainedLinkage,
     prior: WearPrior,
     strategy: Strategy,
     *,

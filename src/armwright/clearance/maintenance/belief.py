@@ -17,7 +17,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, Numbers, integer, not_negative, positive
-from armwright.clearance.maintenance.wearing_linkage import GrowthTable
+from armwright.clearance.maintenance.maintained_linkage import GrowthTable
 from armwright.errors import InvalidValueError, ShapeError
 
 # No pin has less [m].

@@ -18,8 +18,8 @@ from armwright.clearance.estimation.measurement_file import refuse_large_errors
 from armwright.clearance.estimation.static_estimate import closed_at_poses
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Measured
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
 from armwright.clearance.maintenance.strategy import read_offsets
-from armwright.clearance.maintenance.wearing_linkage import Places, WearingLinkage
 from armwright.errors import UnknownNameError
 from armwright.files.column_names import LENGTH, NUMBER, Column, Schema
 from armwright.files.limits import limit, limit_message
@@ -56,7 +56,7 @@ class RestCheck:
     offsets: Array
     readings: Array
 
-    def measured(self, machine: WearingLinkage, noise: float, believed: Array) -> Measured:
+    def measured(self, machine: MaintainedLinkage, noise: float, believed: Array) -> Measured:
         """Return what the readings say of the clearances.
 
         Args:
@@ -87,7 +87,7 @@ class ClearanceCheck:
     clearances: Array
     deviations: Array
 
-    def measured(self, machine: WearingLinkage, noise: float, believed: Array) -> Measured:
+    def measured(self, machine: MaintainedLinkage, noise: float, believed: Array) -> Measured:
         """Return what they say of all clearances; they need neither poses nor the noise of readings."""
         del machine, noise
         design = np.eye(len(believed))[list(self.pins)]

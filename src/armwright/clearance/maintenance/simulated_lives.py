@@ -20,8 +20,8 @@ from armwright.arrays import Array, Numbers, integer
 from armwright.clearance.ideal import IdealMotion, close_pins, inverse_dynamics, tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Belief
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
 from armwright.clearance.maintenance.strategy import NextStop, Planner, read_offsets
-from armwright.clearance.maintenance.wearing_linkage import Places, WearingLinkage
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import force_magnitudes
 from armwright.clearance.wear.contact_history import leaning_slips, pin_angles, rotate
@@ -132,7 +132,7 @@ def simulate_lives(
 
 
 def leaning_tips(  # noqa: PLR0917 - the arrays of an equilibrium
-    machine: WearingLinkage, places: Places, drives: Array, clearances: Array, tilts: Array, guess: Array
+    machine: MaintainedLinkage, places: Places, drives: Array, clearances: Array, tilts: Array, guess: Array
 ) -> Array:
     """Return (v, ..., m, 2) where the full equilibrium puts the tip [m].
 
@@ -149,7 +149,7 @@ def leaning_tips(  # noqa: PLR0917 - the arrays of an equilibrium
     return tip_position(machine.linkage, close_pins(machine.linkage, q, drives=drives, gaps=turned))
 
 
-def coupled_rates(machine: WearingLinkage, clearances: Array) -> Array:
+def coupled_rates(machine: MaintainedLinkage, clearances: Array) -> Array:
     """Return (..., p) growth by stroke and wear coefficient with all clearances (..., p) as they are [N/m].
 
     Forces and sliding distances are those of the equilibrium; only the width of the worn arcs is that of the table.
@@ -170,7 +170,7 @@ def coupled_rates(machine: WearingLinkage, clearances: Array) -> Array:
 class _Population:
     """Linkages that wear, as nobody knows them."""
 
-    def __init__(self, machine: WearingLinkage, start: Belief, count: int, rng: np.random.Generator) -> None:
+    def __init__(self, machine: MaintainedLinkage, start: Belief, count: int, rng: np.random.Generator) -> None:
         drawn = rng.integers(len(start.clearances), size=count)
         self._machine, self._prior, self._rng = machine, start.prior, rng
         self.clearances, self.logs = start.clearances[drawn], start.logs[drawn]
@@ -245,7 +245,7 @@ def _check(
         life.stops.append(Stop(life.now, changed))
 
 
-def _commanded(machine: WearingLinkage, shifts: Array) -> Array:
+def _commanded(machine: MaintainedLinkage, shifts: Array) -> Array:
     """Return (..., m, n) coordinates of the corrected command: moved against shifts (..., m, 2) of the tip."""
     linkage, places = machine.linkage, machine.watched
     guess = np.broadcast_to(places.q, (*shifts.shape[:-1], places.q.shape[-1]))

@@ -17,7 +17,7 @@ import numpy as np
 
 from armwright.arrays import Array, integer, not_negative, positive
 from armwright.clearance.maintenance.belief import Belief, Measured
-from armwright.clearance.maintenance.wearing_linkage import Places, WearingLinkage
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError
@@ -128,13 +128,13 @@ class Planner:
         shifts: (s, 2 m, p) of the tip by clearance, with journals somewhere in their friction cones.
     """
 
-    machine: WearingLinkage
+    machine: MaintainedLinkage
     strategy: Strategy
     growth_noise: Array
     shifts: Array
 
     @classmethod
-    def of(cls, machine: WearingLinkage, strategy: Strategy, samples: int = 1000, seed: int = 0) -> Planner:
+    def of(cls, machine: MaintainedLinkage, strategy: Strategy, samples: int = 1000, seed: int = 0) -> Planner:
         """Return the planner for beliefs of so many samples."""
         rng = np.random.default_rng([seed, 1])
         pins, watched = len(machine.linkage.pins), machine.watched
@@ -260,7 +260,7 @@ class Planner:
 
 
 def read_offsets(  # noqa: PLR0917 - what a check consists of
-    machine: WearingLinkage, poses: Places, offsets: Array, readings: Array, noise: float, believed: Array
+    machine: MaintainedLinkage, poses: Places, offsets: Array, readings: Array, noise: float, believed: Array
 ) -> list[Measured]:
     """Return what the offsets of the resting tip of n linkages say of their clearances.
 

@@ -15,7 +15,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.equations import free_forces, mass_matrix
+from armwright.clearance.equations import free_forces
+from armwright.clearance.ideal import gap_derivatives, mass_matrices, place_bodies, stack
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement
 from armwright.clearance.settings import contact_stiffness
@@ -68,7 +69,7 @@ def contact_modes(linkage: Linkage, closed: ArrayLike, clearances: ArrayLike | N
     forces = K * depths**1.5
     free = [i for i in range(rest.q.shape[-1]) if i not in linkage.driven]
     H = _stiffness_matrix(linkage, rest.q, rest.gaps, forces, slopes)
-    M = _mass_matrices(linkage, rest.q)
+    M = mass_matrices(place_bodies(linkage, rest.q))
     frequencies = np.zeros((len(rest.q), len(free)))
     shapes = np.zeros((*rest.q.shape, len(free)))
     for k in range(len(rest.q)):
@@ -84,7 +85,7 @@ def _stiffness_matrix(linkage: Linkage, q: Array, gaps: Array, forces: Array, sl
     """Return (m, n, n) second derivatives of the energy of weights, loads and contacts at rest."""
     outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
     along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
-    G = _gap_jacobians(linkage, q)
+    G = _gap_jacobians(place_bodies(linkage, q))
     tension = (forces / np.linalg.norm(gaps, axis=-1))[..., None, None]
     springs = slopes[..., None, None] * _outer(outward) + tension * _outer(along)
     H = np.einsum("mpai,mpab,mpbj->mij", G, springs, G)
@@ -103,30 +104,12 @@ def _outer(vectors: Array) -> Array:
 
 def _gradient(linkage: Linkage, q: Array, pushes: Array) -> Array:
     """Return (m, n) the generalised forces needed against weights, loads and pushes (m, p, 2) of the journals."""
-    need = np.einsum("mpai,mpa->mi", _gap_jacobians(linkage, q), pushes)
-    for i, force in enumerate(free_forces(_placed(linkage, q))):
-        need[..., i] -= force
-    return np.asarray(need)
+    placement = place_bodies(linkage, q)
+    own = stack(q.shape[:-1], free_forces(placement))
+    return np.asarray(np.einsum("mpai,mpa->mi", _gap_jacobians(placement), pushes) - own)
 
 
-def _placed(linkage: Linkage, q: Array) -> Placement:
-    return Placement(linkage, list(np.moveaxis(q, -1, 0)), [0.0] * q.shape[-1])
-
-
-def _gap_jacobians(linkage: Linkage, q: Array) -> Array:
+def _gap_jacobians(placement: Placement) -> Array:
     """Return (m, p, 2, n) derivatives of the gaps, from bearing to journal, by the coordinates."""
-    placement = _placed(linkage, q)
-    J = np.zeros((len(q), len(linkage.pins), 2, q.shape[-1]))
-    for k, pin in enumerate(linkage.pins):
-        for sign, end in ((1.0, pin.journal), (-1.0, pin.bearing)):
-            for i, partial in placement.point(end).partials.items():
-                J[:, k, 0, i] += sign * partial.x
-                J[:, k, 1, i] += sign * partial.y
-    return J
-
-
-def _mass_matrices(linkage: Linkage, q: Array) -> Array:
-    M = np.zeros((*q.shape, q.shape[-1]))
-    for (i, j), entry in mass_matrix(_placed(linkage, q)).items():
-        M[:, i, j] = M[:, j, i] = entry
-    return M
+    J = gap_derivatives(placement)
+    return J.reshape(len(J), -1, 2, J.shape[-1])

@@ -15,9 +15,9 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, not_negative
+from armwright.clearance.ideal import place_bodies, stack
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
-from armwright.clearance.placement import Placement
 from armwright.clearance.predictability import perturb_clearances
 from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
@@ -178,8 +178,7 @@ def _tip_accelerations(simulation: Simulation) -> Array:
 
 def _tip_velocity(simulation: Simulation, q: Array, qd: Array) -> Array:
     linkage = simulation.scenario.linkage
-    placement = Placement(linkage, list(np.moveaxis(q, -1, 0)), list(np.moveaxis(qd, -1, 0)))
-    return np.stack(np.broadcast_arrays(*placement.point(linkage.tip).velocity), axis=-1)
+    return stack(q.shape[:-1], place_bodies(linkage, q, qd).point(linkage.tip).velocity)
 
 
 def _rms(values: Array) -> Array:

@@ -16,8 +16,8 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.ideal import place_bodies
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.placement import Placement
 from armwright.clearance.simulation import Simulation
 from armwright.errors import InvalidValueError
 
@@ -74,7 +74,7 @@ class PinAngles(NamedTuple):
 
 def pin_angles(linkage: Linkage, q: Array, qd: Array) -> PinAngles:
     """Return the angles of the bodies at the pins of a linkage for coordinates and speeds (s, n), without jumps."""
-    placement = Placement(linkage, list(q.T), list(qd.T))
+    placement = place_bodies(linkage, q, qd)
     columns: list[list[Array]] = [[], [], [], []]
     for pin in linkage.pins:
         for k, end in enumerate((pin.bearing, pin.journal)):
@@ -105,7 +105,7 @@ def simulated_contact(simulation: Simulation, until: float = math.inf) -> Contac
     angles, gaps = pin_angles(linkage, q, qd), simulation.gaps
     gradients = simulation.contact_geometry(gaps)[1][:rows]
     gaps, outward = gaps[:rows], gradients / np.linalg.norm(gradients, axis=-1, keepdims=True)
-    placement = Placement(linkage, list(q.T), list(qd.T))
+    placement = place_bodies(linkage, q, qd)
     points = [(placement.point(pin.journal), placement.point(pin.bearing)) for pin in linkage.pins]
     moved = [np.broadcast_arrays(*journal.velocity.minus(bearing.velocity), q[:, 0])[:2] for journal, bearing in points]
     velocities = np.stack([np.stack(velocity, axis=-1) for velocity in moved], axis=1)

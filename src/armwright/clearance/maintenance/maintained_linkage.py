@@ -124,7 +124,7 @@ class GrowthTable:
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class WearingLinkage:
+class MaintainedLinkage:
     """A linkage on its path, with the poses at which it is measured.
 
     Attributes:
@@ -163,9 +163,9 @@ class WearingLinkage:
         return np.asarray(self.aim @ self.watched.along)
 
 
-def wearing_linkage(
+def maintained_linkage(
     linkage: Linkage, path: Path, law: WearLaw | None = None, *, exposure: float, poses: int = 3
-) -> WearingLinkage:
+) -> MaintainedLinkage:
     """Prepare a linkage for the plan of its checks.
 
     Args:
@@ -191,7 +191,7 @@ def wearing_linkage(
     table, depth_by_work = _tabulate(stroke, unit, c, positive(exposure, "exposure", "m²/N"))
     by_drives = _tip_by_drives(linkage, watched.q)
     inverse: Array = np.linalg.pinv(by_drives, rcond=1e-6).astype(np.float64)
-    return WearingLinkage(
+    return MaintainedLinkage(
         linkage=linkage,
         law=unit,
         stroke=stroke,
