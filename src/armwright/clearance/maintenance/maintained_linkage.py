@@ -23,6 +23,7 @@ from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
 from armwright.clearance.static_equilibrium import force_magnitudes
 from armwright.clearance.wear.contact_history import rotate
+from armwright.clearance.wear.life import wearing_clearances
 from armwright.clearance.wear.worn_stroke import Stroke, lean, leaning_growth
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
 from armwright.errors import InvalidValueError
@@ -178,13 +179,9 @@ def maintained_linkage(
     Raises:
         InvalidValueError: the path cannot be followed, a pin does not wear, or no poses are left.
     """
-    if not linkage.pins:
-        raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
+    c = wearing_clearances(linkage)
     if integer(poses, "poses", least=1) > _MAX_POSES:
         raise InvalidValueError(f"poses: expected 1 to {_MAX_POSES}, got {poses}")
-    c = linkage.clearance_array(None)
-    if not np.all(c > 0):
-        raise InvalidValueError(f"clearances: wear needs them above 0, got {c.min() * 1e3:g} mm")
     unit = attrs.evolve(law or WearLaw(coefficient=1.0), coefficient=1.0)
     stroke = Stroke.of(linkage, path, _MOMENTS)
     watched, left_out = _watched(linkage, path, stroke)

@@ -23,6 +23,8 @@ from armwright.errors import InvalidValueError
 MAX_STEP = 0.02
 # Steps of a life at most; a step is made anew until the compliance of its wear is right to about this part.
 _MAX_STEPS, _RIGHT, _TRIES = 2000, 0.03, 12
+# A smaller clearance is none, and its walls have no direction in which they wear [m].
+_LEAST_CLEARANCE = 1e-9
 # Depths beyond this part of the radius of a journal are no wear but a broken pin.
 _BROKEN = 0.5
 
@@ -123,7 +125,7 @@ def wear_life(
     if integer(steps, "steps", least=1) > _MAX_STEPS:
         raise InvalidValueError(f"steps: expected at most {_MAX_STEPS}, got {steps}")
     linkage = stroke.linkage
-    c = _clearances(linkage)
+    c = wearing_clearances(linkage)
     depth = positive(max_step, "max_step") * c
     radii = np.array([pin.journal_radius for pin in linkage.pins])
     surfaces = WornSurfaces.new(len(linkage.pins), law.bins)
@@ -160,13 +162,19 @@ def wear_life(
     )
 
 
-def _clearances(linkage: Linkage) -> Array:
-    """Return (p,) the clearances of pins that can wear [m]."""
+def wearing_clearances(linkage: Linkage) -> Array:
+    """Return (p,) the clearances of pins that can wear [m].
+
+    Raises:
+        InvalidValueError: there are none, or one is too small.
+    """
     if not linkage.pins:
         raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
     c = linkage.clearance_array(None)
-    if not np.all(c > 0):
-        raise InvalidValueError(f"clearances: wear needs them above 0, got {c.min() * 1e3:g} mm")
+    if not np.all(c >= _LEAST_CLEARANCE):
+        raise InvalidValueError(
+            f"clearances: wear needs them at least {_LEAST_CLEARANCE * 1e3:g} mm, got {c.min() * 1e3:g} mm"
+        )
     return c
 
 

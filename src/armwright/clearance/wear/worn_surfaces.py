@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, integer, not_negative, positive
+from armwright.arrays import Array, in_range, integer, not_negative, number
 from armwright.clearance.lane_layout import Integers
 from armwright.clearance.linkage import Linkage, Material
 from armwright.clearance.wear.foundation import bin_angles, foundation_modulus, hertz_half_angle, layer_modulus
@@ -25,6 +25,8 @@ PRESSURES: tuple[Pressure, ...] = ("hertz", "winkler")
 FEWEST_BINS, MOST_BINS = 36, 3600
 # A contact narrower than two bins to each side is made as wide: no profile tells it.
 _NARROWEST = 2
+# Wear coefficients, to that of the growth by unit of it [mm³/(N m)]; widths and layers [mm].
+_COEFFICIENTS, _LENGTHS = (1e-15, 1e9), (1e-3, 1e5)
 
 
 @attrs.frozen(kw_only=True)
@@ -51,9 +53,9 @@ class WearLaw:
 
     def __attrs_post_init__(self) -> None:
         """Check names and ranges."""
-        positive(self.coefficient, "wear coefficient")
-        positive(self.width, "width", "m")
-        positive(self.layer, "layer", "m")
+        in_range(number(self.coefficient, "wear coefficient") * 1e9, _COEFFICIENTS, "wear coefficient", "mm³/(N m)")
+        in_range(number(self.width, "width") * 1e3, _LENGTHS, "width", "mm")
+        in_range(number(self.layer, "layer") * 1e3, _LENGTHS, "layer", "mm")
         one_of("pressure", self.pressure, PRESSURES)
         if not 0 <= not_negative(self.bearing_share, "bearing share") <= 1:
             raise InvalidValueError(f"bearing share: expected 0 to 1, got {self.bearing_share:g}")
