@@ -44,7 +44,7 @@ def wear_files(assessment: WearAssessment, *, command: str) -> dict[str, Any]:
             sections=[
                 Card("Life", tables(assessment.tables())),
                 Card("Figures", figures(drawn)),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card("Files", downloads(beside, drawn)),
             ],
             numbers=_tiles(assessment),
             notes=assessment.notes,
