@@ -181,6 +181,26 @@ EXHIBITS = (
         shown="figure4.18.svg",
     ),
     Exhibit(
+        name="worn",
+        title="Worn pins",
+        says="Archard's law takes material from bearings and journals where the motion presses them. The profiles are "
+        "magnified; the command prints how many strokes the tip stays within a limit, with half the steps beside.",
+        alt="Three pins: round circles, and the worn profiles of bearing and journal, lobes on one side of each",
+        command="clearance wear five-bar --path pick-and-place --clearance J2=0.328 --clearance J3=0.171 "
+        "--clearance J4=0.483 --k 1e-5 --limit-ap 0.7",
+        shown="profiles.svg",
+    ),
+    Exhibit(
+        name="failure",
+        title="The life of an arm with play",
+        says="Clearances and the wear coefficient are known with their spread. The probability that the error of the "
+        "tip has passed 1 mm increases with the strokes; one in ten arms has passed it at B10.",
+        alt="A curve of the probability of failure over the strokes, with a band and the points B10 and B50",
+        command="clearance reliability five-bar --path pick-and-place --poses 5 --clearance J2=0.328 "
+        "--clearance J3=0.171 --clearance J4=0.483 --limit 1 --k 1e-5",
+        shown="failure-error.svg",
+    ),
+    Exhibit(
         name="calibration",
         title="Calibration from measured points",
         says="Simulated laser-tracker measurements of a PUMA: the residuals are about one millimetre with the nominal "

@@ -31,10 +31,10 @@ mistake is reported once; errors that follow from it are not reported.
 
 Comments at the beginning of a program below state how it is checked: `// std=83` and `// strict` are options of \
 `armwright check`; `// cell: arms ARM_1` describes the cell against which the program is checked, and `// import:` the \
-contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of nine small \
+contents of the imported file. `// run in one_arm` means that the message appears at run time, in one of ten small \
 cells: a Stanford arm (`one_arm`), the same above a plane of contact (`plane`), above a table (`table`), above parts \
-(`parts`) and above a very light one (`sheet`), a PUMA 560 (`puma`), a UR5 (`ur5`), a Stanford arm \
-beside a belt (`belt`), and two arms with outputs and encoders (`controller`); `// export krl` \
+(`parts`) and above a very light one (`sheet`), a PUMA 560 (`puma`), a UR5 (`ur5`), one on springs (`springs`), a \
+Stanford arm beside a belt (`belt`), and two arms with outputs and encoders (`controller`); `// export krl` \
 exports the motion of the run, and `// export krl program` the program; `// physics` simulates it with \
 servos, contact and grippers; `// limits:`, `// around:` and `// effort:` give the options and limits of the run.
 """

@@ -255,12 +255,14 @@ def test_joints_that_are_refused() -> None:
 
 
 def test_commands_for_rigid_bodies() -> None:
-    """Wear and sensitivities of all dimensions take rigid bodies, and name the elastic ones."""
+    """Wear, sensitivities of all dimensions and payloads of runs take rigid bodies, and name the elastic ones."""
     linkage = elastic_five_bar(modes=1)
     with pytest.raises(InvalidValueError, match="wear: expected rigid bodies, got elastic link2, link3"):
         assess_wear(linkage, thesis_path("y1"), WearLaw(coefficient=1e-14))
     with pytest.raises(InvalidValueError, match="sensitivities of the tip: expected rigid bodies, got elastic link2"):
         rest_sensitivities(linkage, np.zeros(8))
+    with pytest.raises(InvalidValueError, match="payloads: expected rigid bodies, got elastic link2, link3"):
+        find_static_equilibrium(linkage, np.zeros(8), payload=0.1)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from armwright.clearance.paths import Path as TipPath, constant_speed_path, thes
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import Scenario, prepare_scenario
 from armwright.clearance.settings import Settings
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, ShapeError
 from clearance.arms import beginning
 from clearance.trees import tree
 from samples import Sample
@@ -168,3 +168,9 @@ def test_a_controller_has_no_counterpart() -> None:
     path = beginning(thesis_path("y1"), 0.01)
     with pytest.raises(InvalidValueError, match="MuJoCo has no counterpart for a controller"):
         mjcf_files(prepare_scenario(load_linkage("five-bar"), path, Settings(step=1e-3, control="pd+ff")))
+
+
+def test_a_joint_for_each_coordinate() -> None:
+    """Coordinates that are not those of the joints are refused, rather than a model written that does not load."""
+    with pytest.raises(ShapeError, match=r"coordinates of rigid bodies: expected a shape ending in \(3,\), got \(5,\)"):
+        linkage_mjcf(load_linkage("four-bar"), np.zeros(5), np.zeros(5), step=1e-3)

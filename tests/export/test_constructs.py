@@ -34,6 +34,7 @@ PROGRAMS = {
     "STRAIGHTLY, APPROACH, DEPARTURE": "MOVE ARM_1 TO b STRAIGHTLY ; MOVE ARM_1 TO c WITH APPROACH = b ;",
     "MOVE to JOINTS": "MOVE ARM_1 TO JOINTS(10, -30, 40, 10, 20, 5) ;",
     "CIRCULARLY": "MOVE ARM_1 TO c CIRCULARLY, VIA (b) ;",
+    "SMOOTHLY": "MOVE ARM_1 TO b SMOOTHLY ; MOVE ARM_1 TO c STRAIGHTLY, SMOOTHLY, WITH SPEED = 20 ;",
     "VIA": "MOVE ARM_1 TO c VIA (b) ;",
     "VIA with BLEND": "MOVE ARM_1 TO c VIA (b), WITH BLEND = 0.02 ;",
     "BLEND into the next MOVE of the joints": "MOVE ARM_1 TO b WITH BLEND = 0.02 ; MOVE ARM_1 TO c ;",
@@ -108,6 +109,7 @@ encoders = {{ counts = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6] }}
     dimmer = '\nHORN = {}\nDIMMER = { analogue = true, output = 5, signal = "aoDimmer" }'
     text = text.replace("[devices]", f"{second}\n[devices]{dimmer}")
     text = text.replace("[inputs]", "[inputs]\nDOOR = {}") if "[inputs]" in text else f"{text}\n[inputs]\nDOOR = {{}}\n"
+    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, 0, 0, 0]\n"
     return text.replace("[visions]", "[visions]\nC = [[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.42,-0.10, 0.20]]")
 
 

@@ -70,6 +70,7 @@ PROGRAMS = {
     "TIMER": "TIMER t ON ;",
     "MOVE to JOINTS": "MOVE ARM_1 TO JOINTS(10, -60, 60, 0, 30, 0) ;",
     "CIRCULARLY": "MOVE ARM_1 TO b CIRCULARLY, VIA (b * XYZ(20, 20, 0)) ;",
+    "SMOOTHLY": "IF n > 99 THEN MOVE ARM_1 TO b SMOOTHLY ;",
     "VELOCITY, ROTATION, ACCELERATION": "MOVE ARM_1 TO b STRAIGHTLY, WITH ROTATION = 20 ;",
     "BLEND into the next MOVE": "MOVE ARM_1 TO b WITH BLEND = 10 ; MOVE ARM_1 TO a ;",
     "COBEGIN, EVENT, LOCK": "COBEGIN BEGIN PAUSE 0.1 END ; BEGIN n = 2 END COEND ;",
@@ -85,6 +86,7 @@ def cell(target: str, folder: Path) -> Cell:
     belt = (
         "[frames.BELT]\nat = [1,0,0, 0,1,0, 0,0,1, 0.4,0,0.1]\nmoves = { speed_mm_per_s = 10, window_mm = [-500, 500] }"
     )
+    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, 0, 0, 0]\n"
     seen = "C = [[1,0,0, 0,-1,0, 0,0,-1, 0.40,0.06,0.16]]"
     path.write_text(text.replace("[visions]", f"{belt}\n\n[visions]\n{seen}"), "utf-8")
     return read_cell(path)

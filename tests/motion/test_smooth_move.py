@@ -140,7 +140,7 @@ def test_straight_line() -> None:
     move = cartesian_move(arm, X)
     part = shaped(move.trajectory, shaper("zv", 20.0))
 
-    found = distance_from_line(UR5, part, *X)
+    found = distance_from_line(UR5, part, *X).largest
 
     p = forward(UR5, part(np.linspace(0, part.duration, 20_000)))
     along = (X[1] - X[0])[:3, 3] / np.linalg.norm((X[1] - X[0])[:3, 3])

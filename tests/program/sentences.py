@@ -26,6 +26,7 @@ IN_CONTEXT: Mapping[str, tuple[str, ...]] = {
     "FOR_WORD": ("FOR", "for"),
     "TOOLKEY": ("VELOCITY", "rotation", "Acceleration", "TRACKING", "CORRECTION", "bound", "RATE"),
     "CIRCULARLY": ("CIRCULARLY", "circularly"),
+    "SMOOTHLY": ("SMOOTHLY", "smoothly"),
     "WITHIN": ("WITHIN", "within"),
     "TIMER": ("TIMER", "timer"),
     "WHEN": ("WHEN", "when"),

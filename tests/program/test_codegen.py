@@ -60,6 +60,7 @@ def test_stages(clauses: str, expected: list[tuple[str, ...]]) -> None:
         ("WITH SPEED = 12.5", ["MVDIR", "MVSPD 12.5"]),
         ("DIRECTLY, WITH SPEED = n", ["MVDIR", "MVSPD N"]),
         ("STRAIGHTLY", ["MVSTR"]),
+        ("SMOOTHLY, STRAIGHTLY", ["MVSTR", "MVSMO"]),
         ("VIA (v)", ["MVVIA V"]),
         ("VIA (v, w), WITH BLEND = 20mm", ["MVVIA V W", "MVBLD 0.02"]),
         ("WITH DURATION = 300ms", ["MVDIR", "MVDUR 0.3"]),

@@ -78,6 +78,8 @@ def test_run_time_pages_run() -> None:
         "E410",
         "E411",
         "E412",
+        "E413",
+        "E414",
         "E504",
         "E505",
         "E506",

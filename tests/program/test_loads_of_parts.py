@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.loads import loaded_arm
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
-from armwright.dynamics import inverse_dynamics
+from armwright.dynamics import inverse_dynamics, with_gears
 from armwright.kinematics import forward, jacobian, jacobian_rate
 from armwright.program import Source, run
 from armwright.program.vm.interpreter import motion_warnings
@@ -133,3 +133,19 @@ def test_a_controller_that_knows_nothing_of_parts() -> None:
     knowing, ignorant = (ran(lift, cell_of_parts(knows=knows)).stages[-1].peak_effort[1] for knows in (True, False))
 
     assert knowing > ignorant + 20
+
+
+def test_frequencies_of_a_loaded_arm() -> None:
+    """A MOVE SMOOTHLY is shaped for the lower frequencies that the arm has with the part in its hand."""
+    slowest = []
+    for knows in (True, False):
+        cell = cell_of_parts(knows=knows)
+        placed = cell.arms["ARM_1"]
+        springs = attrs.evolve(placed, arm=with_gears(placed.arm, [2e4, 2e4, *[np.inf] * 4]))
+        shaping = (
+            ran("MOVE weight TO above SMOOTHLY ;", attrs.evolve(cell, arms={"ARM_1": springs})).stages[-1].stage.shaping
+        )
+        assert shaping is not None
+        slowest.append(shaping.frequencies)
+
+    assert (slowest[0] < 0.95 * slowest[1]).all()

@@ -53,6 +53,7 @@ WORDS = {
         "pulse",
         "within",
         "circularly",
+        "smoothly",
         "velocity",
         "raise",
         "jam",

@@ -241,13 +241,15 @@ BEGIN
   WHEN PRIORITY 2 : NOT y DO BRAKE ;
   TIMER t ON ; LOG "a" (n) ; PULSE v FOR 3 ; RAISE jam WITH "x" ;
   MOVE ARM_1 TO f CIRCULARLY, VIA (b), WITH VELOCITY = 3, WITH TRACKING = belt ;
+  MOVE ARM_1 TO f SMOOTHLY ; MOVE ARM_1 TO f STRAIGHTLY, SMOOTHLY, WITH SPEED = 3 ;
   WAIT UNTIL x WITHIN 3 ELSE HALT ;
 END.
 """
     words = [word for kind, word in coloured(text) if kind in Keyword and word in WORDS_IN_CONTEXT]
     assert words == [
         *("CONST", "RECORD", "TEXT", "FUNCTION", "IN", "INOUT", "BOOLEAN", "RETURN", "WHEN", "BRAKE", "RESUME"),
-        *("WHEN", "BRAKE", "TIMER", "LOG", "PULSE", "RAISE", "CIRCULARLY", "VELOCITY", "TRACKING", "WITHIN"),
+        *("WHEN", "BRAKE", "TIMER", "LOG", "PULSE", "RAISE", "CIRCULARLY", "VELOCITY", "TRACKING"),
+        *("SMOOTHLY", "SMOOTHLY", "WITHIN"),
     ]
     for word in sorted(WORDS_IN_CONTEXT | {"MODULE", "AS"}):
         uses = (

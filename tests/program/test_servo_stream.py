@@ -31,6 +31,7 @@ CELLS = {
     "sort": "ur5_cell",
     "seam": "ur5_cell",
     "seam_tracking": "seam_cell",
+    "smoothly": "springs_cell",
     "fetch": "stanford_cell",
     "belt": "belt_cell",
     "gearbox": "puma_cell",

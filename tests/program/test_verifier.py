@@ -141,6 +141,7 @@ def test_code_is_gone_through_once() -> None:
     [
         (["COPY N 1e101", "STOP"], "expected a number from -1e+100 to 1e+100, got 1e+101"),
         (['PRINT "\\ud800"', "STOP"], 'expected text in ""'),
+        (["MVBEG A B", "MVSMO", "MVVIA A", "MVEND", "STOP"], "expected MVSMO without MVCIR, MVVIA, MVBLD"),
         (
             [*(f"TRY @{499 - n:04d}" for n in range(250)), *(f"ENDT @{n + 1:04d}" for n in range(250, 500)), "STOP"],
             "more than 200 instructions TRY are nested",
@@ -148,7 +149,7 @@ def test_code_is_gone_through_once() -> None:
     ],
 )
 def test_beyond_what_can_be_run(steps: list[str], fault: str) -> None:
-    """Numbers beyond the largest, half a character, and TRYs too deep in one another are refused when code is read."""
+    """Numbers too large, half a character, MOVEs of no kind, and TRYs too deep are refused when code is read."""
     with pytest.raises(FileFormatError, match=re.escape(fault)):
         assemble(_assembled(steps), "x.rlc")
 

@@ -18,6 +18,7 @@ from armwright.cell.signals import Input
 from armwright.cell.trials import Trials
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.mode_shaping import ModeShaping
 from armwright.spatial.poses import one_pose
 
 # A path that passes its corners without a stop must round them, in gross motion.
@@ -63,6 +64,7 @@ class CellArm:
         sensors: what its controller knows of its joints there.
         force_sensor: between the arm and its tool there.
         controller: what is known of its real controller.
+        smooth: how a MOVE SMOOTHLY of it is shaped, against vibrations on its flexible gears.
     """
 
     arm: Arm
@@ -76,6 +78,7 @@ class CellArm:
     sensors: Sensors = attrs.field(factory=Sensors)
     force_sensor: ForceSensor = attrs.field(factory=ForceSensor)
     controller: Controller = attrs.field(factory=Controller)
+    smooth: ModeShaping = attrs.field(factory=ModeShaping)
 
     @property
     def gripper_or_usual(self) -> Gripper:

@@ -25,6 +25,7 @@ from armwright.cell.outputs_reader import read_controller, read_devices
 from armwright.cell.scene import Spread
 from armwright.cell.scene_reader import read_fixtures, read_gripper, read_markers, read_parts
 from armwright.cell.signals_reader import read_inputs
+from armwright.cell.smooth_reader import read_shaping, with_read_gears
 from armwright.cell.trials_reader import read_trials
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, FileFormatError, MeshWarning, closest
@@ -217,7 +218,7 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         weighed(arm)
     except ArmwrightError as error:
         raise table.error("model", f"{error}, but the motions of a program are computed with efforts") from error
-    arm = _with_tool(arm, table)
+    arm = with_read_gears(_with_tool(arm, table), table.table("smooth"))
     base = read_pose(table, "base", default=np.eye(4))
     table.allow("hand", "joint_positions")
     start = _read_start(table, arm, base)
@@ -236,6 +237,7 @@ def _read_arm(table: Table, folder: Path) -> CellArm:
         sensors=read_sensors(table.table("sensors")),
         force_sensor=read_force_sensor(table.table("force")),
         controller=read_controller(table, arm.n),
+        smooth=read_shaping(table.table("smooth")),
     )
     table.allow("gripper", "plant")
     table.refuse_unknown_keys()

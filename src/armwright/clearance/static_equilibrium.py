@@ -83,6 +83,10 @@ def find_static_equilibrium(
             are worn, or there is a payload, and bodies elastic.
         ShapeError: an array does not fit.
     """
+    if worn is not None:
+        refuse_rods("worn walls", linkage.rods)
+    if payload is not None:
+        refuse_rods("payloads", linkage.rods)
     start = floats(ideal, "ideal")
     c = linkage.clearance_array(clearances)
     if np.any(c < 0):
@@ -111,10 +115,6 @@ def find_static_equilibrium(
     if np.any(~converged & (moved > _ROUNDING)):
         raise _no_equilibrium(linkage, moved)
     if linkage.rods:
-        if worn is not None:
-            refuse_rods("worn walls", linkage.rods)
-        if payload is not None:
-            refuse_rods("payloads", linkage.rods)
         q, size = _with_elastic_rods(linkage, q, drives, c, np.broadcast_to(np.asarray(K), c.shape))
     return StaticEquilibrium(q=q, tip=tip_position(linkage, q), gaps=pin_gaps(linkage, q), forces=size)
 

@@ -63,6 +63,8 @@ _PROGRAMS: Mapping[Target, tuple[ModuleType, ModuleType]] = {
 }
 # Languages that do not say in lengths how corners are rounded.
 _WITHOUT_ZONES = ("fanuc",)
+# Languages with a command for positions at the period of the controller, so that motions run as they are planned.
+_STREAMING = ("urscript",)
 
 
 @attrs.frozen(kw_only=True)
@@ -194,7 +196,8 @@ def _proved(target: Target, files: dict[str, str], proof: Proof) -> ExportedProg
 def _language(target: Target, recording: Recording, name: str) -> tuple[dict[str, str], Proof]:
     """Return the file of a target that has a language, with its proof."""
     writer, checker = _LANGUAGES[target]
-    program = plan_statements(recording, name, zones=target not in _WITHOUT_ZONES)
+    zones, streams = target not in _WITHOUT_ZONES, target in _STREAMING
+    program = plan_statements(recording, name, zones=zones, streams=streams)
     written = writer.write(program)
     proof = Proof(
         target=target,

@@ -45,7 +45,7 @@ _READING = (Op.INPUT, Op.ANALOG, Op.FORCE)
 _Event: TypeAlias = tuple[float, float, Effect, tuple[RunStage, ...]]
 
 
-def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> ControllerProgram:
+def plan_statements(recording: Recording, name: str, *, zones: bool = True, streams: bool = True) -> ControllerProgram:
     """Return what the controller of the arm that a program moved is to do.
 
     Args:
@@ -53,6 +53,7 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
         name: of the program, as its file is called.
         zones: whether the language of the controller says from where on a corner is rounded; without that, a path with
             rounded corners is given by joint positions along it.
+        streams: whether it has positions at the period of the controller, so that a motion runs as it is planned.
 
     Raises:
         ExportError: the run has what a controller cannot repeat without it: a guarded MOVE, branches that work at the
@@ -60,6 +61,8 @@ def plan_statements(recording: Recording, name: str, *, zones: bool = True) -> C
     """
     refuse_tracking(recording)
     refuse_guards(recording)
+    if not streams:
+        _refuse_shaping(recording)
     arm_name = only_arm(recording)
     _refuse_parallel(recording)
     placed = recording.cell.arms[arm_name]
@@ -173,6 +176,19 @@ def refuse_tracking(recording: Recording) -> None:
             text = "a frame that moves is tracked by the controller itself, and a planned motion is always the same"
             helps = ["export the parts of the program before and behind it"]
             raise refusal(recording.code.source, "E611", text, stage.span, "a frame is tracked here", helps=helps)
+
+
+def _refuse_shaping(recording: Recording) -> None:
+    """Refuse a run with a MOVE that is shaped: the controller runs its motions by its own profile.
+
+    Raises:
+        ExportError: it has one.
+    """
+    for stage in recording.stages:
+        if stage.stage.shaping is not None:
+            text = "SMOOTHLY shapes how a motion runs in time, and in this language the controller decides that"
+            helps = ["export it to `urscript`, `ros2` or `csv`, which get the positions over time"]
+            raise refusal(recording.code.source, "E611", text, stage.span, "shaped here", helps=helps)
 
 
 def only_arm(recording: Recording) -> str:
@@ -330,15 +346,22 @@ def _motion(stage: RunStage, recording: Recording, solver: Solver, *, zones: boo
     if not np.ptp(motion(np.linspace(0.0, motion.duration, _LOOKS)), axis=0).any():
         return [Wait(span=span, seconds=motion.duration)]
     is_one = planned.goal is None or len(planned.goal.poses) == 1
+    if planned.shaping is not None:
+        return [_knots(stage, recording, solver)]
     if planned.kind == "PTP" and is_one and stage.path is None:
         part = _speed_part(stage, solver)
         return [MoveJoints(span=span, stage=stage, q=end, duration=motion.duration, speed_part=part)]
     straight = ("LINE", "BLEND") if zones else ("LINE",)
     if planned.kind in straight and planned.detour is None and planned.goal is not None:
         return [_lines(stage, planned.goal.poses, planned.goal.blend, solver)]
-    times = path_knots(motion, solver, recording.cell.deviation)
+    return [_knots(stage, recording, solver)]
+
+
+def _knots(stage: RunStage, recording: Recording, solver: Solver) -> MoveKnots:
+    """Return the statement for joint positions along a stage."""
+    times = path_knots(stage.motion, solver, recording.cell.deviation)
     part = _speed_part(stage, solver)
-    return [MoveKnots(span=span, stage=stage, times=times, q=motion(times), speed_part=part)]
+    return MoveKnots(span=stage.span, stage=stage, times=times, q=stage.motion(times), speed_part=part)
 
 
 def _speed_part(stage: RunStage, solver: Solver) -> float:

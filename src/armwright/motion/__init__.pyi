@@ -13,6 +13,7 @@ from .detour import Detour as Detour, line_or_detour as line_or_detour
 from .efforts import effort_peaks as effort_peaks, slowing_for_efforts as slowing_for_efforts
 from .flat_feedforward import FlatMotion as FlatMotion, flat_motion as flat_motion, ninth as ninth
 from .limit_utilization import limit_use as limit_use, slowing_for_limits as slowing_for_limits
+from .mode_shaping import ModeShaping as ModeShaping
 from .moves import (
     Move as Move,
     cartesian_move as cartesian_move,

@@ -16,9 +16,8 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, read_only
-from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.polynomials import evaluate
-from armwright.motion.solver import Solver
+from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
@@ -35,8 +34,9 @@ _SAMPLES = (4, 200)
 _LEG_SAMPLES, _MAX_LEG_SAMPLES, _LEG_ADDED = 8, 128, 0.1
 # A distance below this is not sampled more closely [m].
 _SMALL = 1e-9
-# Of the distance of any polynomials from a line: longest step between two samples [s].
-_LINE_STEP = 1e-3
+# Of the distance of any polynomials from a line: samples are so dense that they miss no more than this [m], [rad], but
+# there are no more than so many on an interval.
+_LINE_MISSED, _MAX_LINE_SAMPLES = 1e-6, 1000
 # Positions of the tool and entries of its rotation are computed to so many roundings.
 ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
@@ -114,6 +114,11 @@ class TrackingError(NamedTuple):
     def worst_time(self) -> float:
         """When the largest distance of all was sampled [s]."""
         return float(self.times[self.sampled_position.argmax()])
+
+    @property
+    def largest(self) -> Tolerance:
+        """Upper bounds of distance and angle on all intervals."""
+        return Tolerance(float(self.position.max()), float(self.orientation.max()))
 
 
 class ToolMotion(Protocol):
@@ -444,19 +449,20 @@ def _leg_distance(p: Array, A: Array, B: Array) -> Array:
     return np.asarray(np.linalg.norm(p - A - along[..., None] * leg, axis=-1))
 
 
-def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> Tolerance:
-    """Return upper bounds of how far the tool is from a straight line, and from the orientation that belongs there.
+def distance_from_line(arm: AnyArm, trajectory: Trajectory, A: Array, B: Array) -> TrackingError:
+    """Return how far the tool is from a straight line, and from the orientation that belongs there.
 
     The motion may be polynomials of any degree. Between samples a time d apart position and orientation leave their
     chords by no more than d²/8 times their greatest second derivatives.
 
     Args:
-        arm: with n joints.
+        arm: with n joints, or a compiled one, which is faster.
         trajectory: of them.
         A: (4, 4) pose of the tool at which the line begins.
         B: (4, 4) pose at which it ends.
     """
-    tool, speed = _tool_bounds(arm, trajectory)
+    solver = solver_of(arm)
+    tool, speed = _tool_bounds(solver.arm, trajectory)
     shift = B[:3, 3] - A[:3, 3]
     length = float(np.linalg.norm(shift))
     turn = rotation_vector(A[:3, :3].T @ B[:3, :3])
@@ -466,17 +472,28 @@ def distance_from_line(arm: Arm, trajectory: Trajectory, A: Array, B: Array) -> 
         tool.angular_speed, tool.angular_acceleration, per_metre * tool.acceleration, per_metre * speed
     )
     h = trajectory.lengths
-    count = max(_SAMPLES[0], math.ceil(float(h.max()) / _LINE_STEP))
-    q = np.stack([evaluate(trajectory.coefficients, (part * h)[:, None]) for part in np.arange(count + 1) / count])
-    X = np.asarray(forward(arm, q))
-    p = X[..., :3, 3] - A[:3, 3]
-    along = p @ shift / max(length**2, _SMALL**2)
-    away = np.linalg.norm(p - np.clip(along, 0, 1)[..., None] * shift, axis=-1).max(axis=0)
-    due = A[:3, :3] @ rotation_from_vector(along[..., None] * turn)
-    sines = half_sines(due, X[..., :3, :3]).max(axis=0)
+    missed = float((h**2 / 8 * np.maximum(tool.acceleration, 2 * bend)).max())
+    count = min(max(_SAMPLES[0], math.ceil(math.sqrt(missed / _LINE_MISSED))), _MAX_LINE_SAMPLES)
+    parts = np.arange(count + 1) / count
+    along, away, half = np.empty((3, len(parts), len(h)))
+    for i, part in enumerate(parts):
+        X = np.asarray(solver.forward(evaluate(trajectory.coefficients, (part * h)[:, None])))
+        p = X[..., :3, 3] - A[:3, 3]
+        along[i] = p @ shift / max(length**2, _SMALL**2)
+        away[i] = np.linalg.norm(p - np.clip(along[i], 0, 1)[..., None] * shift, axis=-1)
+        half[i] = half_sines(A[:3, :3] @ rotation_from_vector(along[i, :, None] * turn), X[..., :3, :3])
+    sines = half.max(axis=0)
     between = (h / count) ** 2 / 8
-    sine = float((sines + between * bend).max())
-    return Tolerance(float((away + between * tool.acceleration).max()), 2 * math.asin(min(sine, 1.0)))
+    way = along.T.ravel() * length
+    return TrackingError(
+        position=away.max(axis=0) + between * tool.acceleration,
+        orientation=2 * np.arcsin(np.minimum(sines + between * bend, 1.0)),
+        sampled_position=away.max(axis=0),
+        sampled_orientation=2 * np.arcsin(np.minimum(sines, 1.0)),
+        times=trajectory.times[:-1] + parts[away.argmax(axis=0)] * h,
+        samples=count,
+        backward=float((np.maximum.accumulate(way) - way).max() + 2 * (between * tool.acceleration).max()),
+    )
 
 
 def _tool_bounds(arm: Arm, trajectory: Trajectory) -> tuple[ToolBounds, Array]:

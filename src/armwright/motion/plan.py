@@ -19,6 +19,7 @@ from armwright.motion.certificate import Certificate
 from armwright.motion.certified_motion import joined
 from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.limited import limited_motion
+from armwright.motion.mode_shaping import StageShaping
 from armwright.motion.obstruction import Cause, PathError, cause_of, check_ends
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
@@ -135,6 +136,7 @@ class PlannedStage:
         goal: what it was planned for.
         unmet: the speeds of the tool that were asked for and that the limits of the arm do not allow; the first are
             those asked for, the second those that it reaches. None where the arm could do as asked.
+        shaping: what was done against vibrations; None for nothing.
     """
 
     kind: StageKind
@@ -147,6 +149,7 @@ class PlannedStage:
     detour: Detour | None = None
     goal: StageGoal | None = None
     unmet: tuple[ToolLimits, ToolLimits] | None = None
+    shaping: StageShaping | None = None
 
 
 class StageError(ArmwrightError, ValueError):

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, integer
+from armwright.arrays import Array
 from armwright.dynamics.flexible_joints import deflection, modes
 from armwright.errors import IncapableArmError, InvalidValueError, counted, one_of
 from armwright.files.result_table import ResultTable
@@ -17,8 +17,9 @@ from armwright.motion.certificate import slowing
 from armwright.motion.deviation import distance_from_line
 from armwright.motion.flat_feedforward import FlatMotion, flat_motion, ninth
 from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
+from armwright.motion.mode_shaping import ModeShaping, mode_shaper
 from armwright.motion.moves import Move
-from armwright.motion.shaping import Shaper, ShaperKind, combined, shaped, shaper
+from armwright.motion.shaping import Shaper, ShaperKind, shaped
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.tolerance import Tolerance
 from armwright.motion.trajectory import Trajectory, join
@@ -27,14 +28,12 @@ from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Status
 
 Smoothing: TypeAlias = Literal["zv", "zvd", "ei", "flat"]
-# Configurations at which frequencies are computed, and at which paths are compared.
-_MEAN, _COMPARED = 101, 2001
+# Configurations at which paths are compared.
+_COMPARED = 2001
 # Rounds in which a move is slowed until it keeps its limits, and what more it is slowed by.
 _ROUNDS, _MORE = 30, 1e-3
 # After its end an arm is watched for so many periods of its lowest mode, within these times [s].
 _WATCHED, _WATCH = 5.0, (0.2, 10.0)
-# A shaper takes so long at most [s].
-_LONGEST = 60.0
 # An arm is at rest when its tool stays so near to its end [m].
 _AT_REST = 1e-4
 # No gear that carries an arm is deflected farther by its weight [rad], [m].
@@ -267,20 +266,10 @@ def _flat(arm: Arm, move: Move) -> _Command:
 
 def _shaped(arm: AnyArm, move: Move, kind: ShaperKind, *, count: int, tolerance: float) -> _Command:
     """Return the command of shapers for the slowest modes."""
-    planned = move.trajectory
-    found = modes(solver_of(arm).arm, planned(np.linspace(0, planned.duration, _MEAN)))
-    frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
-    # What is damped more creeps to its place.
-    slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
-    pairs = zip(frequencies[slowest].tolist(), damping[slowest].tolist(), strict=True)
-    by = combined([shaper(kind, f, z, tolerance=tolerance) for f, z in pairs])
-    if by.duration > _LONGEST:
-        raise InvalidValueError(
-            f"{kind} would add {by.duration:.3g} s to the move, for gears that vibrate at {frequencies[0]:.3g} Hz; "
-            f"expected {_LONGEST:g} s at most: check the stiffness of the gears"
-        )
+    shaping = ModeShaping(kind=kind, count=count, tolerance=tolerance)
+    by, frequencies = mode_shaper(solver_of(arm).arm, move.trajectory, shaping)
     legs, parts = _shaped_legs(arm, _legs(move), by)
-    return _Command(parts, join(parts), join(legs), frequencies[slowest], float(by.parts @ by.delays))
+    return _Command(parts, join(parts), join(legs), frequencies, float(by.parts @ by.delays))
 
 
 def _legs(move: Move) -> list[Trajectory]:
@@ -338,7 +327,7 @@ def _straight(arm: Arm, move: Move, parts: list[Trajectory], smoothing: Smoothin
     for i, part in enumerate(parts):
         if move.detours and move.detours[i].method != "line":
             raise InvalidValueError(f"the detour from pose {i + 1} to pose {i + 2} cannot be shaped; expected a line")
-        found = distance_from_line(arm, part, move.poses[i], move.poses[i + 1])
+        found = distance_from_line(arm, part, move.poses[i], move.poses[i + 1]).largest
         if found.position > allowed.position or found.orientation > allowed.orientation:
             raise InvalidValueError(
                 f"shaped by {smoothing}, the straight line from pose {i + 1} to pose {i + 2} would be left by up to "

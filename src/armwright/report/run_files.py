@@ -212,6 +212,7 @@ def _stage_data(run: RunStage, recording: Recording) -> dict[str, Any]:
         "certificate": None if run.stage.certificate is None else run.stage.certificate.as_data(),
         "slowed": run.stage.slowed,
         "detour": _detour_data(run.stage),
+        "shaping": None if run.stage.shaping is None else run.stage.shaping.as_data(),
         "clearance": clearance_data(run.clearance),
         "planned_path": None if run.path is None else run.path.as_data(),
         "peak_speed": _rounded_list(motion.peaks(1)),

@@ -35,7 +35,7 @@ class RunSummary:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The stages that were slowed, and the numbers of the run; none if it failed."""
+        """The stages that were slowed, planned anew or shaped, and the numbers of the run; none if it failed."""
         recording = self.recording
         if recording.failure is not None:
             return ()
@@ -50,6 +50,12 @@ class RunSummary:
             f"{path_text(run.path)}"
             for run in recording.stages
             if run.path is not None
+        ]
+        smooth = [
+            f"line {recording.code.source.place(run.span.start)}: {run.stage.kind} to {run.goal_names[-1]}: "
+            f"{run.stage.shaping.summary}"
+            for run in recording.stages
+            if run.stage.shaping is not None
         ]
         moves = sum(effect.kind == "MOVE" for effect in recording.effects)
         ticks = len(recording.streams[0].t) if recording.streams else 0
@@ -66,7 +72,7 @@ class RunSummary:
             if placed.arm.massless
         ]
         return (
-            *shorten_list([*slowed, *planned], MAX_TERMINAL_LINES, self.hint),
+            *shorten_list([*slowed, *planned, *smooth], MAX_TERMINAL_LINES, self.hint),
             numbers,
             *unknown,
             *([text] if (text := physics_text(recording)) else []),

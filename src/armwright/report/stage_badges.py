@@ -9,7 +9,7 @@ from armwright.report.page import StageBadge
 
 
 def stage_badges(run: RunStage) -> Iterator[StageBadge]:
-    """Yield where a stage was stopped, its detour, why it is slow, and whether its certificate holds.
+    """Yield where a stage was stopped, its detour, how it is shaped, why it is slow, and whether its certificate holds.
 
     Args:
         run: the stage as it was run.
@@ -30,6 +30,8 @@ def stage_badges(run: RunStage) -> Iterator[StageBadge]:
         yield StageBadge(text="stops at frames", title=title, mark="warn")
     if run.path is not None:
         yield StageBadge(text="planned path", title=path_text(run.path))
+    if stage.shaping is not None:
+        yield StageBadge(text=f"smooth {stage.shaping.added:+.2f} s", title=stage.shaping.summary)
     if certificate is not None and certificate.because is not None:
         limit, joint = certificate.because
         text = f"{SHORT[limit]} j{joint + 1}"

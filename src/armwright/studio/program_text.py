@@ -18,9 +18,11 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import UTF_16, UTF_32, PositionCodec, column_count
 from armwright.program.language.source import Source
 from armwright.program.syntax.nodes import ArmName, Name
-from armwright.program.syntax.tree import Blend, Circularly, Directly, Move, Straightly, Via, clause_word
+from armwright.program.syntax.tree import Blend, Circularly, Directly, Move, Smoothly, Straightly, Via, clause_word
 
 _NORMAL_SPEED = 100.0
+# What says how a MOVE goes that goes past no frames.
+_NOT_PAST = (Directly, Straightly, Circularly, Smoothly)
 # Speeds of a MOVE, and the longest approach [m].
 _SPEEDS = (1, 120)
 _LONGEST_LINE = 1.0
@@ -287,7 +289,7 @@ class ProgramText:
         """
         self.require_statements()
         move = self._move_in(line)
-        plain = next((it for it in move.clauses if isinstance(it, Directly | Straightly | Circularly)), None)
+        plain = next((it for it in move.clauses if isinstance(it, _NOT_PAST)), None)
         if plain is not None:
             word = clause_word(type(plain))
             raise ProgramTextError(f"the MOVE in line {line} goes {word}, which cannot be combined with VIA")

@@ -146,7 +146,8 @@ class LinkageSimulators:
         for name in dict.fromkeys(row.simulator for row in self.comparisons if "armwright" not in row.simulator):
             rows = [row for row in self.comparisons if row.simulator == name]
             most = max(float(row.apart[: row.together].max()) for row in rows)
-            yield Tile(f"{most * 1e6:.2g} µm", f"from {name} at most, pins {rows[0].pins}")
+            when = "pins closed" if rows[0].pins == "closed" else "before pins rattle apart"
+            yield Tile(f"{most * 1e6:.2g} µm", f"from {name} at most, {when}")
 
     def figures(self) -> list[Drawing]:
         """Return the distance of the tips over time for each linkage."""

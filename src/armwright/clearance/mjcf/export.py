@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import LARGEST, Array, exact_shape
 from armwright.clearance.drive_tables import csv_text, drive_table
 from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.ideal import tip_position
@@ -69,6 +69,7 @@ def linkage_mjcf(linkage: Linkage, q: Array, qd: Array, *, step: float) -> str:
 
     Raises:
         InvalidValueError: a name has characters that no XML file can hold, a body's a colon, or one is called world.
+        ShapeError: coordinates or speeds are not those of the joints of rigid bodies.
     """
     _check_names(linkage)
     root = Element("mujoco", model=linkage.name)
@@ -104,6 +105,8 @@ def linkage_mjcf(linkage: Linkage, q: Array, qd: Array, *, step: float) -> str:
             biastype="affine",
             biasprm="1",
         )
+    joints = (len(list(world.iter("joint"))),)
+    q, qd = exact_shape(q, joints, "coordinates of rigid bodies", LARGEST), exact_shape(qd, joints, "speeds", LARGEST)
     keyframe = SubElement(root, "keyframe")
     SubElement(
         keyframe,

@@ -117,6 +117,7 @@ class Op(enum.StrEnum):
     MVDIR = "MVDIR", ""  # the shortest way in joint space
     MVSTR = "MVSTR", ""  # one straight line
     MVCIR = "MVCIR", ""  # one arc through the frame of MVVIA
+    MVSMO = "MVSMO", ""  # shaped, against vibrations on flexible gears
     MVJNT = "MVJNT", "N+"  # numbers: the goal is these joint positions, whatever MVBEG says of it
     MVTGT = "MVTGT", "w"  # joint target of the cell: the goal is that
     MVVIA = "MVVIA", "P+"  # frames: through these without a stop
@@ -177,7 +178,7 @@ class Op(enum.StrEnum):
 # What may stand between MVBEG and MVEND.
 MOVE_PARTS = frozenset(
     (
-        *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
+        *(Op.MVDIR, Op.MVSTR, Op.MVCIR, Op.MVSMO, Op.MVJNT, Op.MVTGT, Op.MVVIA, Op.MVAPP, Op.MVDEP),
         *(Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVVEL, Op.MVROT, Op.MVACC, Op.MVTRK, Op.MVON),
         *(Op.MVCOR, Op.MVBND, Op.MVRAT),
     )
@@ -255,6 +256,7 @@ class Form:
         circular: one arc through what lies on the way.
         jointwise: the joints go straight from one configuration to the next, and past what lies on the way.
         tracking: the goal goes with a frame that moves.
+        smooth: each stage is shaped against vibrations.
     """
 
     goal: str
@@ -266,6 +268,7 @@ class Form:
     circular: bool = False
     jointwise: bool = False
     tracking: bool = False
+    smooth: bool = False
 
     @property
     def direct(self) -> bool:
@@ -303,8 +306,9 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
 
 
 def stages_text(form: Form) -> str:
-    """Return the stages in a word each, such as ``PTP apf1 / LINE obj1``."""
-    return " / ".join(" ".join((stage.kind.value, *stage.frames)) for stage in stages_of(form))
+    """Return the stages in a word each, such as ``PTP apf1 / LINE obj1``, and whether they are shaped."""
+    text = " / ".join(" ".join((stage.kind.value, *stage.frames)) for stage in stages_of(form))
+    return f"{text} smoothly" if form.smooth else text
 
 
 @attrs.frozen(kw_only=True)

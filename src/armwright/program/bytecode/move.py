@@ -14,6 +14,7 @@ from armwright.program.syntax import tree
 _CLAUSES: dict[type, Op] = {
     tree.Straightly: Op.MVSTR,
     tree.Circularly: Op.MVCIR,
+    tree.Smoothly: Op.MVSMO,
     tree.Departure: Op.MVDEP,
     tree.Via: Op.MVVIA,
     tree.Approach: Op.MVAPP,
@@ -109,6 +110,7 @@ def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
         blend=tree.Blend in clauses,
         circular=tree.Circularly in clauses,
         tracking=tree.Tracking in clauses,
+        smooth=tree.Smoothly in clauses,
     )
 
 

@@ -97,6 +97,8 @@ _TOOL_LIMITS = {Op.MVVEL, Op.MVROT, Op.MVACC}
 _WAYS = {Op.MVSTR, Op.MVCIR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVBLD, Op.MVJNT, Op.MVTGT}
 # What a path that a sensor corrects needs.
 _CORRECTED = {Op.MVSTR, Op.MVBND, Op.MVRAT}
+# Ways to go that are not shaped.
+_NOT_SMOOTH = {Op.MVCIR, Op.MVVIA, Op.MVBLD, Op.MVTRK, Op.MVCOR}
 # Which routines an instruction ends, and what else does not lead on to the next.
 _ENDED_ROUTINES: Mapping[Op, tuple[Routine, ...]] = {
     Op.RET: (Routine.PROCEDURE, Routine.CONDITION, Routine.ACTION, Routine.WATCH),
@@ -185,6 +187,8 @@ def _wrong_neighbours(code: Code) -> Iterator[CodeError]:
             yield CodeError(number, "expected MVCIR with one frame in MVVIA, and without MVSTR, MVDEP, MVAPP and MVBLD")
         if op is Op.MVTRK and _parts_of(code, number) & (_WAYS - {Op.MVSTR} | _TOOL_LIMITS):
             yield CodeError(number, "expected MVTRK without another way to go and without limits of the tool")
+        if op is Op.MVSMO and _parts_of(code, number) & _NOT_SMOOTH:
+            yield CodeError(number, "expected MVSMO without MVCIR, MVVIA, MVBLD, MVTRK and MVCOR")
         if op is Op.MVCOR and not _is_corrected(_parts_of(code, number)):
             yield CodeError(number, "expected MVCOR with MVSTR, MVBND and MVRAT, and without another way to go")
         if number in targets and before in MOVE_PARTS | {Op.MVBEG, Op.FORK}:

@@ -13,7 +13,7 @@ from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, dimens
 from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import expression_text
-from armwright.program.semantics.move import SPEED_NOTE
+from armwright.program.semantics.move import SPEED_NOTE, no_flexible_gear
 from armwright.program.syntax import tree
 
 # Clauses whose value is a number.
@@ -63,6 +63,8 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
             require_value(state, clause.value)
         elif isinstance(clause, tree.Tracking):
             _check_tracking(state, clause)
+        elif isinstance(clause, tree.Smoothly):
+            _check_smooth(state, clause, arm)
     if arm is None:
         return None
     _warn_of_released_frame(state, node, arm)
@@ -213,6 +215,15 @@ def _check_tracking(state: FlowState, clause: tree.Tracking) -> None:
     text = f"`{state.name(frame)}` is no frame of the cell that moves"
     advice = did_you_mean(closest(frame, state.cell.moving))
     state.report("E249", text, clause.point.span, "nothing to track", note=note, advice=advice)
+
+
+def _check_smooth(state: FlowState, clause: tree.Smoothly, arm: str | None) -> None:
+    """Check that an arm has gears whose vibrations can be shaped, as far as the cell says so."""
+    cell = state.cell
+    if cell is None or cell.flexible is None or arm not in cell.arms or arm in cell.flexible:
+        return
+    text, advice = no_flexible_gear(arm)
+    state.report("E259", text, clause.span, "nothing vibrates", advice=advice)
 
 
 def check_speed(state: FlowState, node: tree.Expression) -> None:

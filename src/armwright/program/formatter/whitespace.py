@@ -17,8 +17,8 @@ _BRACKETS = _OPENING | _CLOSING
 _LIST_WORDS = frozenset(("PRINT", "VIA", "LOCK", "LOG", "RECOVER"))
 # Before these words a line may end, before operations too, but rather not.
 _PARTS = frozenset(
-    ("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "ON", "RIGIDLY")
-) | frozenset(("NONRIGIDLY", "WITHIN"))
+    ("TO", "AT", "FROM", "STEP", "WITH", "VIA", "DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "SMOOTHLY", "ON")
+) | frozenset(("RIGIDLY", "NONRIGIDLY", "WITHIN"))
 _OPERATOR_PENALTIES = {
     **dict.fromkeys(("AND", "OR"), 1),
     **dict.fromkeys(("<", "<=", "<>", ">=", ">"), 3),

@@ -71,7 +71,7 @@ HEADERS_IN_CONTEXT = ("CONST", "FUNCTION", "MODULE", "RECORD")
 # How a parameter is passed, in front of its name.
 PARAMETER_MODES = ("IN", "INOUT")
 # Clauses of MOVE that are words only where a clause may begin.
-PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY",)
+PLAIN_CLAUSES_IN_CONTEXT = ("CIRCULARLY", "SMOOTHLY")
 WITH_CLAUSES_IN_CONTEXT = ("VELOCITY", "ROTATION", "ACCELERATION", "TRACKING", "CORRECTION", "BOUND", "RATE")
 # A clause of QUEUE alone.
 QUEUE_CLAUSES_IN_CONTEXT = ("CAPACITY",)

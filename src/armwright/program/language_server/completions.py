@@ -95,17 +95,20 @@ _WORD_SNIPPETS = {
 _KINDS = {VariableKind.FRAME: Kind.Struct, VariableKind.EVENT: Kind.Event}
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 _VOCABULARY = VOCABULARIES[Standard.RLO_2]
-_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "VIA", *_WITH_CLAUSES))
+_CLAUSES = frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "SMOOTHLY", "VIA", *_WITH_CLAUSES))
 _CLAUSE_ENDS = frozenset((";", *_VOCABULARY.block_ends, *_VOCABULARY.statements))
-_BESIDE_CORRECTION = frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND", "TRACKING"))
+_BESIDE_CORRECTION = frozenset(
+    ("DIRECTLY", "CIRCULARLY", "SMOOTHLY", "VIA", "APPROACH", "DEPARTURE", "BLEND", "TRACKING")
+)
 # Clauses that exclude others.
 _EXCLUDES: Mapping[str, frozenset[str]] = {
     "DIRECTLY": frozenset(("STRAIGHTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "TRACKING")),
     "STRAIGHTLY": frozenset(("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE")),
-    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "APPROACH", "DEPARTURE", "BLEND", "TRACKING")),
-    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY", "TRACKING")),
+    "CIRCULARLY": frozenset(("DIRECTLY", "STRAIGHTLY", "SMOOTHLY", "APPROACH", "DEPARTURE", "BLEND", "TRACKING")),
+    "SMOOTHLY": frozenset(("CIRCULARLY", "VIA", "BLEND", "TRACKING", "CORRECTION", "BOUND", "RATE")),
+    "VIA": frozenset(("DIRECTLY", "STRAIGHTLY", "SMOOTHLY", "TRACKING")),
     **dict.fromkeys(("APPROACH", "DEPARTURE"), frozenset(("DIRECTLY", "STRAIGHTLY", "CIRCULARLY", "TRACKING"))),
-    "BLEND": frozenset(("CIRCULARLY", "TRACKING")),
+    "BLEND": frozenset(("CIRCULARLY", "SMOOTHLY", "TRACKING")),
     "SPEED": frozenset(("DURATION", "VELOCITY")),
     "DURATION": frozenset(("SPEED", "VELOCITY")),
     "VELOCITY": frozenset(("SPEED", "DURATION", "TRACKING")),
@@ -114,7 +117,7 @@ _EXCLUDES: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(("BOUND", "RATE"), _BESIDE_CORRECTION),
     "TRACKING": frozenset(
         (
-            *("DIRECTLY", "CIRCULARLY", "VIA", "APPROACH", "DEPARTURE", "BLEND"),
+            *("DIRECTLY", "CIRCULARLY", "SMOOTHLY", "VIA", "APPROACH", "DEPARTURE", "BLEND"),
             *("VELOCITY", "ROTATION", "ACCELERATION"),
         )
     ),

@@ -51,6 +51,18 @@ def _words(words: Iterable[str]) -> str:
     return f"(?:{'|'.join(sorted(words))})"
 
 
+def _not_behind(words: Iterable[str]) -> str:
+    """Return a pattern for a place that is not one blank behind any of some words, of which names may follow."""
+    by_length: dict[int, list[str]] = {}
+    for word in sorted(words):
+        by_length.setdefault(len(word), []).append(word)
+    return "".join(rf"(?<!\b(?:{'|'.join(some)}) )" for some in by_length.values())
+
+
+# Where an adverb follows a name, and where nothing but another clause, or the end, follows it.
+_ADVERBS = ("DIRECTLY", "STRAIGHTLY", *PLAIN_CLAUSES_IN_CONTEXT)
+_BEHIND_NAME = rf"(?<=[A-Z0-9_] ){_not_behind((_VOCABULARY.reserved | WORDS_IN_CONTEXT) - set(_ADVERBS))}"
+_BEFORE_CLAUSE = rf"(?:{_AT_END}|(?=,?[ \t]+(?:WITH|ON|VIA|{'|'.join(_ADVERBS)})(?!\w)))"
 # Clauses of queues and of corrected paths.
 _MORE_CLAUSES = ("BOUND", "CAPACITY", "CORRECTION", "RATE")
 # Words that programs may use as names, where what is around them tells that they are words of the language: the kind
@@ -66,7 +78,9 @@ CONTEXT_PATTERNS = (
     ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
     ("keyword", rf"(?<=WITH ){_words({*WITH_CLAUSES_IN_CONTEXT, *_MORE_CLAUSES})}(?=[ \t]*=)"),
     ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?=[ \t]*,?[ \t]*VIA(?!\w))"),
-    ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_AT_END}"),
+    ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
+    ("keyword", rf"{_BEHIND_NAME}{_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
+    ("keyword", rf"(?<=LY, ){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
     ("keyword", rf"(?:RETURN|WITHIN|WHEN){_BEFORE_VALUE}"),
     ("keyword", r"WHEN(?=[ \t]+PRIORITY(?!\w))"),
 )

@@ -19,7 +19,7 @@ class WordDoc(NamedTuple):
 
 
 _QUEUE = "QUEUE arm [WITH CAPACITY | SPEED | VELOCITY | BLEND = number] DO statement"
-_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY | CIRCULARLY] [VIA (poses)] [WITH ... = ...] [ON ... DO ...]"
+_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY | CIRCULARLY] [SMOOTHLY] [VIA (poses)] [WITH ...] [ON ... DO ...]"
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
 _COBEGIN = "COBEGIN [PRIORITY number :] BEGIN ... END ; BEGIN ... END COEND"
@@ -106,6 +106,10 @@ _DOCS: Mapping[str, tuple[str, str]] = {
     "CIRCULARLY": (
         "MOVE frame TO goal CIRCULARLY, VIA (pose)",
         "Moves the tool on an arc of a circle through the position of another pose.",
+    ),
+    "SMOOTHLY": (
+        "MOVE frame TO goal [STRAIGHTLY,] SMOOTHLY",
+        "Shapes the motion so that an arm with flexible gears does not vibrate at its end; it takes a little longer.",
     ),
     "VIA": ("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": (

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import attrs
+import numpy as np
 
 from armwright.arm.reach import reach_of
 from armwright.cell.frames import WORLD
@@ -26,6 +27,7 @@ class KnownCell:
         reach: of the arm that reaches farthest [m]; None when that is not known.
         joints: of each arm whose joints are known a letter for each, R for one that turns and P for one that slides.
         moving: the frames that move by themselves; None when nothing is known of them.
+        flexible: the arms with a gear that is a spring; None when nothing is known of them.
         targets: the joint targets, each with its arm; None when nothing is known of them.
     """
 
@@ -39,6 +41,7 @@ class KnownCell:
     joints: Mapping[str, str] = attrs.field(factory=dict)
     targets: Mapping[str, str] | None = None
     moving: frozenset[str] | None = None
+    flexible: frozenset[str] | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -84,6 +87,9 @@ def known_cell(cell: Cell) -> KnownCell:
         joints={name: "".join("RP"[not it.revolute] for it in arm.arm.joints) for name, arm in cell.arms.items()},
         targets={name: target.arm for name, target in cell.joint_targets.items()},
         moving=frozenset(cell.moving_frames),
+        flexible=frozenset(
+            name for name, it in cell.arms.items() if np.isfinite(it.arm.motor_values("stiffness")).any()
+        ),
     )
 
 

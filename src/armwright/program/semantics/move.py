@@ -134,6 +134,34 @@ def _check_correction(names: NameResolver, node: tree.Move) -> None:
             names.report("E257", text, other.span, "another way", secondary=here, advice=advice)
 
 
+# What is not shaped: the way past other frames, and what is worked out while the arm moves.
+_CONFLICTS_WITH_SMOOTHLY: dict[type, str] = {
+    tree.Circularly: "write a MOVE of its own for the arc",
+    tree.Via: "write one MOVE SMOOTHLY for each leg, at whose end the arm stops",
+    tree.Blend: "leave BLEND out, so that the arm stops at the goal",
+    tree.Tracking: "leave SMOOTHLY out: the goal moves on when it is reached",
+    tree.Correction: "leave SMOOTHLY out: what a sensor asks for on the way is not known before",
+}
+
+
+def no_flexible_gear(arm: str) -> tuple[str, str]:
+    """Return what is to be said of a MOVE SMOOTHLY of an arm with rigid gears, and the advice."""
+    text = f"{arm} has no flexible gear, so SMOOTHLY has nothing to shape"
+    return text, f"give stiffness_Nm_per_rad in the arm file or in `[arms.{arm}.smooth]` of the cell"
+
+
+def _check_smooth(names: NameResolver, first: dict[type, tree.Clause]) -> None:
+    """Check that a MOVE that is shaped goes a way that can be."""
+    smooth = first.get(tree.Smoothly)
+    for kind, advice in _CONFLICTS_WITH_SMOOTHLY.items():
+        clause = first.get(kind)
+        if smooth is not None and clause is not None:
+            text = f"SMOOTHLY cannot be combined with {tree.clause_word(kind)}"
+            here = labels(smooth.span, "shaped against vibrations here")
+            names.report("E258", text, clause.span, "is not shaped", secondary=here, advice=advice)
+            return
+
+
 # What JOINTS as a goal has nothing to do with: only the joints know where they go.
 _CONFLICTS_WITH_JOINTS = (tree.Straightly, tree.Circularly, tree.Via, tree.Approach)
 
@@ -211,6 +239,7 @@ def _check_combination(names: NameResolver, clauses: tuple[tree.Clause, ...]) ->
             names.report("E213", text, clause.span, "second", secondary=labels(earlier.span, "first"))
     if (circular := first.get(tree.Circularly)) is not None:
         _check_arc(names, circular, first)
+    _check_smooth(names, first)
     if len(first) > 1 or tree.Blend in first:
         _check_paths(names, first)
         check_durations(names, first)

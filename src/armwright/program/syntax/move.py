@@ -25,6 +25,9 @@ VALUED_CLAUSES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
         *(tree.Correction, tree.Bound, tree.Rate, tree.Capacity),
     )
 } | {"TRACKING": tree.Tracking}
+ADVERBS: dict[str, Callable[[Span], tree.Clause]] = {
+    tree.clause_word(kind): kind for kind in (tree.Directly, tree.Straightly, tree.Circularly, tree.Smoothly)
+}
 _CLAUSES_IN_CONTEXT = (*PLAIN_CLAUSES_IN_CONTEXT, *WITH_CLAUSES_IN_CONTEXT)
 
 
@@ -90,7 +93,7 @@ def _starts_clause(tokens: TokenStream) -> bool:
     return is_near or (tokens.is_on_same_line() and not closest(token.text, others))
 
 
-# clause = "DIRECTLY" | "STRAIGHTLY" | "CIRCULARLY"
+# clause = "DIRECTLY" | "STRAIGHTLY" | "CIRCULARLY" | "SMOOTHLY"
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
 #        | "WITH" ( "VELOCITY" | "ROTATION" | "ACCELERATION" | "TRACKING" ) "=" expr
@@ -133,12 +136,8 @@ def _replace_misspelt_clause(tokens: TokenStream) -> bool:
 
 
 def _plain_clause(tokens: TokenStream, start: Token, key: str) -> tree.Clause | None:
-    if key == "DIRECTLY":
-        return tree.Directly(start.span)
-    if key == "STRAIGHTLY":
-        return tree.Straightly(start.span)
-    if key == "CIRCULARLY":
-        return tree.Circularly(start.span)
+    if key in ADVERBS:
+        return ADVERBS[key](start.span)
     if key == "VIA":
         return tokens.node(tree.Via, start, parenthesised_list(tokens, expression, "a pose", "after VIA"))
     return None

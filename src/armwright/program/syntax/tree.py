@@ -142,6 +142,11 @@ class Circularly(Node):
 
 
 @attrs.frozen
+class Smoothly(Node):
+    """Shaped, so that an arm with flexible gears does not vibrate at the end."""
+
+
+@attrs.frozen
 class Via(Node):
     """``VIA (points)``."""
 
@@ -252,6 +257,7 @@ Clause: TypeAlias = (
     Directly
     | Straightly
     | Circularly
+    | Smoothly
     | Via
     | Approach
     | Departure

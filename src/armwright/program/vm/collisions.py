@@ -68,11 +68,12 @@ def checked_stages(
         partial(_check, machine),
         fixed_duration=request.duration is not None,
         tool=request.tool,
+        smooth=request.form.smooth,
     )
     move, check = done.move, done.check
     if check.collision is not None:
         goal = request.goals[planned[check.collision.stage][1][-1]]
-        can_plan = can_be_passed(check.collision, done.stages[check.collision.stage])
+        can_plan = not request.form.smooth and can_be_passed(check.collision, done.stages[check.collision.stage])
         error = _error(machine, process, check.collision, arm, (goal.label, goal.span), can_plan=can_plan)
         raise _with_failure(error, done.failure) if done.failure else error
     parts = machine.hardware.part_poses()

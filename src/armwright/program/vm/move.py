@@ -50,6 +50,7 @@ from armwright.program.vm.moves_ahead import fits, goes_over, merged
 from armwright.program.vm.process import EarlyEnd, Guard, Interruption, Motion, MovesAhead, Process
 from armwright.program.vm.queues import require_no_queue
 from armwright.program.vm.recording import RunStage, TrajectorySegment, peak_efforts, trajectory_efforts
+from armwright.program.vm.smoothing import smoothed_stages
 from armwright.program.vm.synchronization import release_locks
 from armwright.program.vm.tracking import follow, leave_frame, plan_tracking, rest_of_following, stop_following
 from armwright.spatial.poses import inverse
@@ -328,8 +329,8 @@ def _plan_stages(
         speed=request.speed,
         deviation=cell.deviation,
         period=cell.period,
-        # A correction is one of a straight line, and not of a detour.
-        around=cell.around if request.correction is None else None,
+        # A straight line is corrected and shaped, and not a detour.
+        around=None if request.correction is not None or request.form.smooth else cell.around,
         tool=request.tool,
     )
     try:
@@ -343,7 +344,9 @@ def _plan_stages(
     except IncapableArmError as error:
         text = f"{arm} cannot make this MOVE at any speed: {error}"
         raise machine.error(process, "E406", text, request.span, "asked for here") from None
-    if request.duration is not None:
+    if request.form.smooth and any(stage.trajectory.duration for stage in stages):
+        stages = smoothed_stages(machine, process, request, stages, arm=arm, planner=planner_of(machine, arm))
+    elif request.duration is not None:
         stages = _slow_to_duration(machine, process, request, stages, request.duration)
     return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 

@@ -101,6 +101,7 @@ def move_request(machine: Machine, process: Process, step: Instruction) -> MoveR
         blend=Op.MVBLD in numbers,
         circular=any(part.op is Op.MVCIR for part in parts),
         tracking=tracked is not None,
+        smooth=any(part.op is Op.MVSMO for part in parts),
     )
     duration, units = numbers.get(Op.MVDUR), machine.code.units
     limits = {

@@ -41,7 +41,7 @@ def fits(ahead: MovesAhead, request: MoveRequest, moved: str) -> bool:
 
 def _is_one_stage(request: MoveRequest) -> bool:
     """Whether a MOVE is one LINE or one PTP, whose end nothing but its goal tells."""
-    if request.tracked is not None or request.correction is not None:
+    if request.tracked is not None or request.correction is not None or request.form.smooth:
         return False
     return (request.form.straight or request.form.direct) and not request.guards and request.duration is None
 

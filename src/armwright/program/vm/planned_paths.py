@@ -53,6 +53,7 @@ def replanned(
     *,
     fixed_duration: bool,
     tool: ToolLimits | None = None,
+    smooth: bool = False,
 ) -> Replanned:
     """Return a MOVE with planned paths instead of the point-to-point stages on which it runs into something.
 
@@ -64,9 +65,10 @@ def replanned(
         check: finds what a MOVE runs into.
         fixed_duration: whether no stage may take longer than it does.
         tool: limits of the tool besides those of the joints.
+        smooth: whether the stages are shaped, so that no other path is planned: its corners would not be.
     """
     done = Replanned(move, stages, {}, check(move))
-    while machine.cell.plan and (collision := done.check.collision) is not None:
+    while machine.cell.plan and not smooth and (collision := done.check.collision) is not None:
         k = collision.stage
         if k in done.paths or not can_be_passed(collision, done.stages[k]):
             break

@@ -241,7 +241,8 @@ def _stages_to_go_on(machine: Machine, motion: Motion) -> list[PendingStage]:
     if reached < planned.duration:
         run = machine.state.stages[motion.stage_index]
         rest, clock = attrs.astuple(resumed(arm, planned, reached, period=period), recurse=False)
-        stage = attrs.evolve(run.stage, trajectory=rest, length=tool_path_length(arm, rest))
+        # What is resumed keeps to the path, and not to the time for which it was shaped.
+        stage = attrs.evolve(run.stage, trajectory=rest, length=tool_path_length(arm, rest), shaping=None)
         stages.append(PendingStage(stage, run.goal_names, _NEVER, run.clearance, run.path, Course(planned, clock)))
     q = machine.hardware.sent_configuration(motion.arm, machine.now)
     if np.abs(q - planned(reached)).max() > _SAME_CONFIGURATION:

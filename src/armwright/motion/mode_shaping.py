@@ -1,0 +1,100 @@
+"""Shapers for the modes in which an arm vibrates on its flexible gears."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, integer
+from armwright.dynamics.flexible_joints import modes
+from armwright.errors import InvalidValueError
+from armwright.motion.shaping import Shaper, ShaperKind, combined, shaper
+from armwright.motion.trajectory import Trajectory
+
+# Configurations at which frequencies are computed.
+_MEAN = 101
+# A shaper takes so long at most [s].
+_LONGEST = 60.0
+
+
+@attrs.frozen(kw_only=True)
+class ModeShaping:
+    """How motions of an arm are shaped.
+
+    Attributes:
+        kind: ``zv``, ``zvd`` or ``ei``, see ``shaper``.
+        count: how many modes, the slowest ones.
+        tolerance: of ``ei``.
+    """
+
+    kind: ShaperKind = "zvd"
+    count: int = 2
+    tolerance: float = 0.05
+
+
+class ModeShaper(NamedTuple):
+    """A shaper and the frequencies (k,) that it shapes, slowest first [Hz]."""
+
+    shaper: Shaper
+    frequencies: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class StageShaping:
+    """What shaping has made of one stage of a move.
+
+    Attributes:
+        kind: of the shaper.
+        frequencies: (k,) that are shaped [Hz].
+        added: how much longer the stage takes [s]; 0 where its duration was asked for.
+        deviation: upper bound of the distance of the tool from the path that it had before [m].
+    """
+
+    kind: ShaperKind
+    frequencies: Array
+    added: float
+    deviation: float
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data in SI units."""
+        return {
+            "shaper": self.kind,
+            "frequencies_hz": self.frequencies.tolist(),
+            "added": self.added,
+            "path_deviation": self.deviation,
+        }
+
+    @property
+    def summary(self) -> str:
+        """What it is, in one line."""
+        of = ", ".join(f"{f:.2f} Hz" for f in self.frequencies) or "no mode that swings"
+        return f"{self.kind} for {of}: {self.added:+.3f} s, path deviation {self.deviation * 1e3:.3f} mm"
+
+
+def mode_shaper(arm: Arm, planned: Trajectory, shaping: ModeShaping) -> ModeShaper:
+    """Return the shaper for the mean frequencies and damping of the slowest modes along a motion.
+
+    Args:
+        arm: with n joints, of which some have flexible gears.
+        planned: the motion.
+        shaping: which shaper, and of how many modes.
+
+    Raises:
+        UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
+        InvalidValueError: a number is out of its range, or the shaper takes longer than a minute.
+    """
+    found = modes(arm, planned(np.linspace(0, planned.duration, _MEAN)))
+    frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
+    # What is damped more creeps to its place.
+    slowest = np.flatnonzero(damping < 1)[: integer(shaping.count, "count", least=1)]
+    pairs = zip(frequencies[slowest].tolist(), damping[slowest].tolist(), strict=True)
+    by = combined([shaper(shaping.kind, f, z, tolerance=shaping.tolerance) for f, z in pairs])
+    if by.duration > _LONGEST:
+        raise InvalidValueError(
+            f"{shaping.kind} would add {by.duration:.3g} s to the move, for gears that vibrate at "
+            f"{frequencies[0]:.3g} Hz; expected {_LONGEST:g} s at most: check the stiffness of the gears"
+        )
+    return ModeShaper(by, frequencies[slowest])
