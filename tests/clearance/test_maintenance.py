@@ -278,6 +278,7 @@ def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
         ({"alpha": 0.7}, "alpha: expected 0.001 to 0.5, got 0.7"),
         ({"least_interval": 1.0}, "least interval: expected at least 1/1000 of the horizon"),
         ({"limit": -1e-4}, "limit: expected more than 0"),
+        ({"noise": 1e-3}, "noise: the mean of 5 readings is known worse than the limit; expected at most 224 um"),
         ({"change_at": 0.0}, "change at: expected a clearance above 0"),
     ],
 )

@@ -61,6 +61,11 @@ class Strategy:
         positive(self.noise, "noise", "m")
         if integer(self.readings, "readings", least=1) > _MOST_READINGS:
             raise InvalidValueError(f"readings: expected 1 to {_MOST_READINGS}, got {self.readings}")
+        if self.noise > self.limit * np.sqrt(self.readings):
+            raise InvalidValueError(
+                f"noise: the mean of {self.readings} readings is known worse than the limit; expected at most "
+                f"{self.limit * np.sqrt(self.readings) * 1e6:.3g} um, got {self.noise * 1e6:g} um"
+            )
         if not _LEAST_ALPHA <= not_negative(self.alpha, "alpha") <= 0.5:
             raise InvalidValueError(f"alpha: expected {_LEAST_ALPHA:g} to 0.5, got {self.alpha:g}")
         if self.horizon / self.least_interval > _MOST_STOPS:
