@@ -176,7 +176,7 @@ def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:
         BadParameter: the unit of one is wrong.
     """
     from armwright.clearance.dimensions import dimensions_of
-    from armwright.reliability.linkage_assessment import SHOWN
+    from armwright.reliability.tolerances import SHOWN
 
     units = {dimension.name: dimension.unit for dimension in dimensions_of(model)}
     found = {}
