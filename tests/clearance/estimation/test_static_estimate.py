@@ -17,11 +17,11 @@ from armwright.clearance.estimation.static_estimate import (
 from armwright.clearance.ideal import close_pins, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
+from armwright.clearance.plane_vectors import rotate
 from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
-from armwright.clearance.wear.contact_history import rotate
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 from samples import Sample

@@ -22,6 +22,7 @@ from armwright.arrays import Array, ArrayLike, Flags, floats, not_negative, posi
 from armwright.clearance.estimation.misfit import p_value, widening
 from armwright.clearance.ideal import ideal_motion, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium, force_magnitudes
@@ -168,7 +169,7 @@ def friction_scatter(linkage: Linkage, q: Array, clearances: ArrayLike, friction
         (..., k, 2, 2) of each pose [m²].
     """
     direction, gains = _contact_directions(linkage, q), tip_sensitivity(linkage, q)
-    across = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+    across = perpendicular(direction)
     mean, angle = _mean_part(friction), 2 * float(np.arctan(friction))
     # Of the cosine and the sine of an angle that is anywhere within ± atan μ with the same probability.
     shrinking = np.sinc(angle / np.pi) / 2

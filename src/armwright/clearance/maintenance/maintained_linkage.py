@@ -22,8 +22,8 @@ from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.ideal import close_pins, inverse_dynamics, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.static_equilibrium import force_magnitudes
-from armwright.clearance.wear.contact_history import rotate
 from armwright.clearance.wear.worn_stroke import Stroke, lean_new, leaning_growth
 from armwright.clearance.wear.worn_surfaces import BROKEN, WearLaw, wearing_clearances
 from armwright.errors import InvalidValueError
@@ -79,7 +79,7 @@ class Places:
             qdd=accelerations,
             tip=tip_position(linkage, q),
             along=np.einsum("mipj,mpj->mip", gains, directions),
-            across=np.einsum("mipj,mpj->mip", gains, rotate(directions, np.full(directions.shape[:-1], np.pi / 2))),
+            across=np.einsum("mipj,mpj->mip", gains, perpendicular(directions)),
         )
 
     def friction_covariance(self, clearances: Array, cone: float) -> Array:

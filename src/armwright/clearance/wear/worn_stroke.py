@@ -21,8 +21,9 @@ from armwright.clearance.ideal import (
 )
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
+from armwright.clearance.plane_vectors import rotate
 from armwright.clearance.scenario import assembly_guess, close_pins_along
-from armwright.clearance.wear.contact_history import ContactHistory, leaning_slips, pin_angles, rotate
+from armwright.clearance.wear.contact_history import ContactHistory, leaning_slips, pin_angles
 from armwright.clearance.wear.foundation import rest_positions
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces, stroke_growth
 from armwright.errors import InvalidValueError
