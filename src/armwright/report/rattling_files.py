@@ -41,13 +41,12 @@ def rattling_files(assessment: RattlingAssessment, *, command: str) -> dict[str,
     if swinging:
         sections.append(Card("Mode shapes at rest in the middle of the path", figures(swinging), "magnified"))
     beside = {"vibration.json": "all numbers, in SI units"}
-    beside |= {f"{one.name}.svg": one.caption.partition(":")[0] for one in (*drawn, *swinging)}
-    sections.append(Card("Files", downloads(beside)))
-    paths = "paths" if several else assessment.rattlings[0].path.name
+    sections.append(Card("Files", downloads(beside, (*drawn, *swinging))))
+    paths = f"{len(assessment.rattlings)} paths" if several else assessment.rattlings[0].path.name
     return {
         "vibration.json": json.dumps({"command": command, **assessment.as_data()}, indent=2, ensure_ascii=False) + "\n",
         "report.html": static_page(
-            title=f"{assessment.linkage.name}: vibration on {len(assessment.rattlings) if several else ''} {paths}",
+            title=f"{assessment.linkage.name}: vibration on {paths}",
             command=command,
             sections=sections,
             numbers=_tiles(assessment),
