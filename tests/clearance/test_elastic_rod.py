@@ -256,7 +256,7 @@ def test_joints_that_are_refused() -> None:
 
 
 def test_commands_for_rigid_bodies() -> None:
-    """Wear, plans of checks, sensitivities of all dimensions and payloads of runs take rigid bodies, and name the elastic ones."""
+    """Wear, plans of checks, sensitivities and payloads of runs take rigid bodies, and name the elastic ones."""
     linkage = elastic_five_bar(modes=1)
     with pytest.raises(InvalidValueError, match="wear: expected rigid bodies, got elastic link2, link3"):
         assess_wear(linkage, thesis_path("y1"), WearLaw(coefficient=1e-14))

@@ -1,7 +1,9 @@
 """Natural frequencies and mode shapes of a linkage with elastic rods, its drives locked and its pins closed.
 
 Journals stay where they touch: a pin with clearance is a pivot in its contact. Weight, loads and the forces in the rods
-count, so that a rod under tension vibrates faster, and one near buckling slowly. ``vibration/contact_modes`` has the modes of a linkage on the springs of its contacts.
+count, so that a rod under tension vibrates faster, and one near buckling slowly.
+
+``vibration/contact_modes`` has the modes of a linkage on the springs of its contacts.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 A journal at rest indents its wall, and a little more force indents it a little more: across the wall a pin is a spring,
 the slope of the Hertz force. Along the wall a journal rolls like a pendulum as long as the clearance. The frequencies
-are those of the linkage on these springs, with its weights; friction, which hinders the rolling, is left out. ``natural_modes`` has those of elastic rods between
-pins that stay closed.
+are those of the linkage on these springs, with its weights; friction, which hinders the rolling, is left out.
+``natural_modes`` has those of elastic rods between pins that stay closed.
 
     H v = ω² M v,    H = ∂²V / ∂q²
 
