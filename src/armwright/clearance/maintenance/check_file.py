@@ -18,7 +18,7 @@ from armwright.clearance.estimation.measurement_file import refuse_large_errors
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Measured
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
-from armwright.clearance.maintenance.strategy import read_offsets
+from armwright.clearance.maintenance.readings import read_offsets
 from armwright.clearance.poses import closed_at_tips
 from armwright.errors import UnknownNameError
 from armwright.files.column_names import LENGTH, NUMBER, Column, Schema
