@@ -23,8 +23,8 @@ from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
+    from armwright.arrays import Array
     from armwright.clearance.linkage import Linkage
-    from armwright.clearance.maintenance.belief import WearPrior
 
 # Of the horizon, for which a check at least should help.
 _LEAST_PART = 1 / 50
@@ -94,9 +94,8 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance plan-checks five-bar --path pick-and-place --k 1e-4 --limit 0.1 --horizon 2e7`
     """
-    import attrs
-
     from armwright.clearance.maintenance.assessment import plan_checks as planned
+    from armwright.clearance.maintenance.belief import WearPrior
     from armwright.clearance.maintenance.check_file import PastCheck, read_checks
     from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
     from armwright.clearance.maintenance.strategy import Strategy
@@ -111,9 +110,10 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     if measurements is not None:
         warn_of_stray(measurements)
         checks = read_checks(measurements, model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
-    prior = attrs.evolve(
-        _prior(model, k, pin_factor or []),
+    prior = WearPrior(
+        clearances=model.clearance_array(None),
         clearance_spread=clearance_sd_mm * 1e-3,
+        coefficients=_coefficients(model, k, pin_factor or []),
         spread=k_spread,
         pin_spread=pin_spread,
         grain=grain_um * 1e-6,
@@ -150,22 +150,13 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     print_result(plan, as_json=as_json, quiet=quiet, output=output)
 
 
-def _prior(model: "Linkage", k: float, factors: list[str]) -> "WearPrior":
-    """Return what the clearances of a linkage, a coefficient in mm³/(N m) and factors of pins say of new pins."""
+def _coefficients(model: "Linkage", k: float, factors: list[str]) -> "Array":
+    """Return (p,) the median wear coefficients [m²/N] that a coefficient in mm³/(N m) and factors of pins tell."""
     import numpy as np
 
-    from armwright.clearance.maintenance.belief import WearPrior
     from armwright.errors import one_of
 
     named = named_numbers(factors, ("",), "a pin and a factor, J3=2", "--pin-factor")
     for pin in named:
         one_of("pin", pin, model.clearances)
-    coefficients = [k * 1e-9 * (named[pin].value if pin in named else 1.0) for pin in model.clearances]
-    return WearPrior(
-        clearances=model.clearance_array(None),
-        clearance_spread=0.0,
-        coefficients=np.array(coefficients),
-        spread=0.0,
-        pin_spread=0.0,
-        grain=0.0,
-    )
+    return np.array([k * 1e-9 * (named[pin].value if pin in named else 1.0) for pin in model.clearances])
