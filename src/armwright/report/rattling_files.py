@@ -11,6 +11,7 @@ from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.placement import Placement
 from armwright.clearance.vibration.assessment import QUANTITIES, PathModes, RattlingAssessment
 from armwright.clearance.vibration.move_law import Aim
+from armwright.clearance.vibration.rattling import RUNS
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, curves, empty_figure, plain_axes, plain_label, svg_text
 from armwright.report.mode_shapes import MovingLine, mode_drawing
@@ -94,7 +95,7 @@ def _ranking(assessment: RattlingAssessment) -> Drawing:
     axes.set_ylim(len(ranking) - 0.4, -0.6)
     axes.set_xlim(left=0.0)
     axes.legend(fontsize="small")
-    return Drawing("ranking", "Ranking of the paths: means and standard deviations over 16 runs", svg_text(figure))
+    return Drawing("ranking", f"Ranking of the paths: means and standard deviations over {RUNS} runs", svg_text(figure))
 
 
 def _frequencies(along: PathModes) -> Drawing:
