@@ -13,6 +13,7 @@ from armwright.clearance.elastic_rod import MAX_MODES, Elasticity, Rod
 from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, BodyPoint, Drive, Guide, Linkage, Pin
+from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
 from armwright.clearance.natural_modes import natural_modes
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage, read_linkage
@@ -255,10 +256,12 @@ def test_joints_that_are_refused() -> None:
 
 
 def test_commands_for_rigid_bodies() -> None:
-    """Wear, sensitivities of all dimensions and payloads of runs take rigid bodies, and name the elastic ones."""
+    """Wear, plans of checks, sensitivities and payloads of runs take rigid bodies, and name the elastic ones."""
     linkage = elastic_five_bar(modes=1)
     with pytest.raises(InvalidValueError, match="wear: expected rigid bodies, got elastic link2, link3"):
         assess_wear(linkage, thesis_path("y1"), WearLaw(coefficient=1e-14))
+    with pytest.raises(InvalidValueError, match="plan of checks: expected rigid bodies, got elastic link2, link3"):
+        maintained_linkage(linkage, thesis_path("y1"), exposure=1e-6)
     with pytest.raises(InvalidValueError, match="sensitivities of the tip: expected rigid bodies, got elastic link2"):
         rest_sensitivities(linkage, np.zeros(8))
     with pytest.raises(InvalidValueError, match="payloads: expected rigid bodies, got elastic link2, link3"):

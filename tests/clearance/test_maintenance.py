@@ -14,8 +14,9 @@ from armwright.clearance.maintenance.belief import Belief, Measured, WearPrior
 from armwright.clearance.maintenance.check_file import ClearanceCheck, read_checks
 from armwright.clearance.maintenance.comparison import compare_ways
 from armwright.clearance.maintenance.maintained_linkage import GrowthTable, MaintainedLinkage, maintained_linkage
+from armwright.clearance.maintenance.readings import read_offsets
 from armwright.clearance.maintenance.simulated_lives import coupled_rates, leaning_tips
-from armwright.clearance.maintenance.strategy import Planner, Strategy, read_offsets
+from armwright.clearance.maintenance.strategy import Planner, Strategy
 from armwright.clearance.paths import named_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.static_equilibrium import find_static_equilibrium

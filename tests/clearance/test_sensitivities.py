@@ -9,9 +9,10 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.dimensions import deviate, dimensions_of
-from armwright.clearance.estimation.static_estimate import closed_at_poses, rest_matrix
+from armwright.clearance.estimation.static_estimate import rest_matrix
 from armwright.clearance.ideal import close_pins, tip_position
 from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Load, Pin
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.sensitivities import rest_sensitivities
@@ -47,7 +48,7 @@ def linkage() -> Linkage:
 
 def test_spec(linkage: Linkage) -> None:
     """The five-bar at the thesis' goals: lengths and zeros as printed, clearances as the estimate at rest has them."""
-    q = closed_at_poses(linkage, GOALS)
+    q = closed_at_tips(linkage, GOALS)
 
     found = rest_sensitivities(linkage, q, np.zeros(3))
 
@@ -59,7 +60,7 @@ def test_spec(linkage: Linkage) -> None:
 
 def test_play_and_length_look_alike(linkage: Linkage) -> None:
     """Play of J2 moves the tip nearly as the length of link 2 does, and play of J4 as that of link 3."""
-    found = rest_sensitivities(linkage, closed_at_poses(linkage, GOALS[:1]), np.zeros(3))
+    found = rest_sensitivities(linkage, closed_at_tips(linkage, GOALS[:1]), np.zeros(3))
 
     for play, length in (("J2.clearance", "link2.length"), ("J4.clearance", "link3.length")):
         b, d = found.column(play)[0], found.column(length)[0]
@@ -247,7 +248,7 @@ def test_driven_carrier() -> None:
 
 def test_batches(linkage: Linkage, rng: np.random.Generator) -> None:
     """Many clearances at many poses make a table of derivatives, each as it is alone."""
-    q = closed_at_poses(linkage, GOALS[:2])
+    q = closed_at_tips(linkage, GOALS[:2])
     c = rng.uniform(1e-4, 5e-4, (3, 1, 3))
 
     found = rest_sensitivities(linkage, q, c)
@@ -260,7 +261,7 @@ def test_batches(linkage: Linkage, rng: np.random.Generator) -> None:
 
 def test_refusals(linkage: Linkage) -> None:
     """No such dimension; no force in the pins."""
-    q = closed_at_poses(linkage, GOALS[:1])
+    q = closed_at_tips(linkage, GOALS[:1])
     with pytest.raises(UnknownNameError, match=r"link2\.length"):
         rest_sensitivities(linkage, q).column("link2.lenght")
     with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import lognorm
 
-from armwright.clearance.estimation.static_estimate import closed_at_poses
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
@@ -39,7 +39,7 @@ def five_bar() -> Linkage:
 def at_rest(*poses: tuple[float, float], **others: object) -> RandomLinkage:
     """The five-bar with clearances of arm A."""
     clearances = RandomClearances(mean=MEAN, covariance=np.eye(3) * DEVIATION**2, **others)  # type: ignore[arg-type]
-    return RandomLinkage.at(five_bar(), closed_at_poses(five_bar(), poses), clearances)
+    return RandomLinkage.at(five_bar(), closed_at_tips(five_bar(), poses), clearances)
 
 
 def ruben(mean: np.ndarray, covariance: np.ndarray, limit: float) -> float:
@@ -71,7 +71,7 @@ def ruben(mean: np.ndarray, covariance: np.ndarray, limit: float) -> float:
 
 def test_published_pose() -> None:
     """From the linkage follow the printed derivatives at Q1, and the printed probabilities by every method."""
-    middle = rest_sensitivities(five_bar(), closed_at_poses(five_bar(), [Q1]), [3e-4] * 3)
+    middle = rest_sensitivities(five_bar(), closed_at_tips(five_bar(), [Q1]), [3e-4] * 3)
     B = middle.of("clearance")[0]
     np.testing.assert_allclose(B, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=5.1e-5)
     printed = B.round(4)
@@ -97,7 +97,7 @@ def test_lengths_and_zeros(rng: np.random.Generator) -> None:
     """Lengths and zeros of drives add their variances, and move the tip as in complete equilibrium."""
     deviations = {"link2.length": 1e-5, "link4.zero": 2e-5}
     clearances = RandomClearances(mean=MEAN, covariance=np.zeros((3, 3)))
-    q = closed_at_poses(five_bar(), [Q1])
+    q = closed_at_tips(five_bar(), [Q1])
     random = RandomLinkage.at(five_bar(), q, clearances, deviations)
     found = rest_sensitivities(five_bar(), q, MEAN)
     columns = np.stack([found.column(name)[0] * size for name, size in deviations.items()], axis=-1)
@@ -110,7 +110,7 @@ def test_lengths_and_zeros(rng: np.random.Generator) -> None:
 def test_friction(rng: np.random.Generator) -> None:
     """Journals anywhere in their cones put the tip where complete equilibria do; the law is that of sampling."""
     clearances = RandomClearances(mean=MEAN, covariance=np.eye(3) * DEVIATION**2)
-    q = closed_at_poses(five_bar(), [Q1, (0.0, -0.575)])
+    q = closed_at_tips(five_bar(), [Q1, (0.0, -0.575)])
     random = RandomLinkage.at(five_bar(), q, clearances, friction=True)
     z = rng.normal(size=(20_000, random.size))
     few = z[:50]
@@ -132,7 +132,7 @@ def test_correlated_clearances(rng: np.random.Generator) -> None:
         drawn = clearances.values(rng.normal(size=(100_000, 3)))
         np.testing.assert_allclose(drawn.mean(axis=0), MEAN, rtol=0, atol=5e-7)
         np.testing.assert_allclose(np.cov(drawn.T), root @ root.T, rtol=0, atol=1e-11)
-    random = RandomLinkage.at(five_bar(), closed_at_poses(five_bar(), [Q1]), clearances)
+    random = RandomLinkage.at(five_bar(), closed_at_tips(five_bar(), [Q1]), clearances)
     assert random.shares.sum() == pytest.approx(1)
 
 
@@ -283,4 +283,4 @@ def test_what_is_no_dimension() -> None:
     """A length that the linkage has not is named, with the nearest."""
     clearances = RandomClearances(mean=MEAN, covariance=np.zeros((3, 3)))
     with pytest.raises(UnknownNameError, match=r"link2\.length"):
-        RandomLinkage.at(five_bar(), closed_at_poses(five_bar(), [Q1]), clearances, {"link2.lenght": 1e-5})
+        RandomLinkage.at(five_bar(), closed_at_tips(five_bar(), [Q1]), clearances, {"link2.lenght": 1e-5})

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from armwright.clearance.estimation.static_estimate import closed_at_poses
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.wear.life import wear_life
 from armwright.clearance.wear.worn_stroke import Stroke
@@ -44,7 +44,7 @@ def wearing(
 ) -> WearingLinkage:
     """The five-bar at Q1, whose pins wear evenly on an arc of 1 rad."""
     clearances = RandomClearances(mean=MEAN, covariance=np.eye(3) * deviation**2)
-    random = RandomLinkage.at(five_bar(), closed_at_poses(five_bar(), [(-0.18, -0.6)]), clearances)
+    random = RandomLinkage.at(five_bar(), closed_at_tips(five_bar(), [(-0.18, -0.6)]), clearances)
     growth = GapGrowth.even(random, np.array(work), arc=1.0, width=WIDTH)
     return WearingLinkage(random=random, growth=growth, median=K, spread=spread, each=each)
 
@@ -158,7 +158,7 @@ def test_worn_walls() -> None:
     ap = worn.measures()["AP"][0]
     limit = float(ap[0] + 0.6 * (ap[-1] - ap[0]))
     clearances = RandomClearances(mean=list(linkage.clearances.values()), covariance=np.zeros((3, 3)))
-    random = RandomLinkage.at(linkage, closed_at_poses(linkage, path.evaluate(worn.stroke.goals).position), clearances)
+    random = RandomLinkage.at(linkage, closed_at_tips(linkage, path.evaluate(worn.stroke.goals).position), clearances)
 
     growing = WearingLinkage(random=random, growth=GapGrowth.worn(random, worn), median=K, spread=0.0)
 

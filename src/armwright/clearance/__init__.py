@@ -1,4 +1,4 @@
-"""Linkages with joint clearance: simulate, estimate, correct."""
+"""Linkages with joint clearance: simulate, estimate, correct, wear, maintain."""
 
 from armwright.lazy_namespace import attach
 

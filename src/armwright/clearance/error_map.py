@@ -21,6 +21,7 @@ from armwright.clearance.five_bar_parts import five_bar_coordinates
 from armwright.clearance.five_bar_workspace import singularity_sines, workspace
 from armwright.clearance.ideal import close_pins, tip_sensitivity
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError
 from armwright.files.result_table import ResultTable
@@ -176,6 +177,6 @@ def _errors_at_rest(linkage: Linkage, guess: Array, drives: Array, positions: Ar
         ]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
     # Across its gap a journal lies anywhere within the cone; the variance of an even spread is a third of the square.
-    across = np.stack([-rest.gaps[..., 1], rest.gaps[..., 0]], axis=-1) * np.arctan(linkage.material.friction)
+    across = perpendicular(rest.gaps) * np.arctan(linkage.material.friction)
     shifts = np.einsum("nipj,npj->npi", gains, across)
     return rest.tip - positions, np.sqrt((shifts**2).sum(axis=(1, 2)) / 3)

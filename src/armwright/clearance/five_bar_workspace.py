@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, Flags, of_shape
 from armwright.clearance.five_bar import MODES, FiveBar, elbow_positions
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.errors import InvalidValueError
 
 CurveKind: TypeAlias = Literal["serial", "parallel"]
@@ -313,7 +314,7 @@ def _parallel_curves(bar: FiveBar, angles: Array, length: float, branch: float) 
     square = length**2 - along**2
     valid = (square >= -_ON_CIRCLE) & (distance > 0)
     unit = base / divisor[:, None]
-    across = np.sqrt(np.maximum(square, 0.0))[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
+    across = np.sqrt(np.maximum(square, 0.0))[:, None] * perpendicular(unit)
     right = left + along[:, None] * unit + branch * across
     tips = left + (right - left) * (bar.rods[0] / length)
     return _split_curve("parallel", tips, valid, _assembly_modes(bar, tips, left, right))

@@ -2,6 +2,8 @@
 
 Journals stay where they touch: a pin with clearance is a pivot in its contact. Weight, loads and the forces in the rods
 count, so that a rod under tension vibrates faster, and one near buckling slowly.
+
+``vibration/contact_modes`` has the modes of a linkage on the springs of its contacts.
 """
 
 from __future__ import annotations

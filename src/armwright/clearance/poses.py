@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, integer, of_shape
-from armwright.clearance.estimation.static_estimate import closed_at_poses
+from armwright.arrays import Array, ArrayLike, floats, integer, of_shape
+from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS, Path as TipPath, named_path
 from armwright.clearance.scenario import assembly_guess, close_pins_along
@@ -65,7 +65,7 @@ def closed_at(linkage: Linkage, poses: ArrayLike) -> Array:
     """
     goals = of_shape(poses, (pose_size(linkage),), "poses")
     if goals.shape[-1] == 2:
-        return closed_at_poses(linkage, goals)
+        return closed_at_tips(linkage, goals)
     q = assembly_guess(linkage)
     found = []
     for goal in goals.reshape(-1, 1):
@@ -74,6 +74,14 @@ def closed_at(linkage: Linkage, poses: ArrayLike) -> Array:
         q = close_pins_along(linkage, np.linspace(start, goal, steps), q, by_tip=False)[-1]
         found.append(q)
     return np.array(found)
+
+
+def closed_at_tips(linkage: Linkage, tips: ArrayLike) -> Array:
+    """Return (k, n) closed coordinates with the tip at positions (k, 2) [m], each from the one before."""
+    configurations = [assembly_guess(linkage)]
+    for position in floats(tips, "positions of the tip").reshape(-1, 2):
+        configurations.append(close_pins(linkage, configurations[-1], tip=position))
+    return np.array(configurations[1:])
 
 
 def closed_along(linkage: Linkage, path: TipPath, count: int) -> Array:

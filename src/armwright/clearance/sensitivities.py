@@ -79,7 +79,7 @@ def rest_sensitivities(
 
     Args:
         linkage: with n coordinates and p pins.
-        ideal: (..., n) coordinates with closed pins, at which the drives are locked; see ``closed_at_poses``.
+        ideal: (..., n) coordinates with closed pins, at which the drives are locked; see ``closed_at_tips``.
         clearances: (..., p) about which the tip is linear [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5], the same for all clearances; rigid ones when left out.
 

@@ -25,6 +25,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.ideal import place_bodies
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.plane_vectors import perpendicular
 
 # Directions in which a journal may touch the wall beside the one that it is pushed in [rad].
 _BESIDE = 1.4
@@ -125,7 +126,7 @@ class WornWalls:
         places = [self.at(i, angle[..., i], rotation[..., i]) for i in range(len(linkage.pins))]
         growth, slope = (np.stack([place[k] for place in places], axis=-1) for k in range(2))
         tilt = slope[..., None] / far
-        along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+        along = perpendicular(outward)
         return size - clearances - growth, outward - tilt * along
 
     def resting_gaps(self, linkage: Linkage, q: Array, forces: Array, clearances: Array, K: Array | float) -> Array:

@@ -5,24 +5,18 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import LinkageName, path_of, with_clearances
+from armwright.cli.linkages import Clearances, LinkageName, SpeedRpm, TipPathName, path_of, with_clearances
 from armwright.cli.options import usage_error
 from armwright.cli.results import write_results
-from armwright.cli.shell_completion import paths
 
 
 def export(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     output: Annotated[Path, Option("-o", "--output", help="Folder for the script and its data.")],
-    path: Annotated[
-        str | None,
-        Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
-    ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    path: TipPathName = None,
+    speed_rpm: SpeedRpm = None,
     revolutions: Annotated[float, Option(help="Number of revolutions of the drive.")] = 1.0,
-    clearance: Annotated[
-        list[str] | None, Option(help="Radial clearance of a pin in mm, as in J2=0.3; may be repeated.")
-    ] = None,
+    clearance: Clearances = None,
     format: Annotated[  # noqa: A002 - named like the option
         Literal["exudyn", "mjcf"], Option("--format", help="Of Exudyn, with clearance, or of MuJoCo, without.")
     ] = "exudyn",

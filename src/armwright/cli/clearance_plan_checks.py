@@ -5,18 +5,26 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Option
 
-from armwright.cli.linkages import LinkageName, path_of, with_clearances
+from armwright.cli.linkages import (
+    BearingShare,
+    Clearances,
+    LinkageName,
+    SpeedRpm,
+    TipPathName,
+    WidthMm,
+    path_of,
+    with_clearances,
+)
 from armwright.cli.numbers import named_numbers
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
-from armwright.cli.shell_completion import paths
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
+    from armwright.arrays import Array
     from armwright.clearance.linkage import Linkage
-    from armwright.clearance.maintenance.belief import WearPrior
 
 # Of the horizon, for which a check at least should help.
 _LEAST_PART = 1 / 50
@@ -27,11 +35,8 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     k: Annotated[float, Option("--k", help="Median of the wear coefficients in mm³/(N m); take a measured one.")],
     limit: Annotated[float, Option(help="Limit of the error along the corrected path in mm.")],
     horizon: Annotated[float, Option(help="Strokes until which is planned, counted from the new linkage.")],
-    path: Annotated[
-        str | None,
-        Option(help="Path of a stroke: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
-    ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    path: TipPathName = None,
+    speed_rpm: SpeedRpm = None,
     alpha: Annotated[float, Option(help="Probability of an error beyond the limit at which a check is due.")] = 0.05,
     k_spread: Annotated[
         float, Option("--k-spread", help="Standard deviation of the logarithm of the wear coefficients of all pins.")
@@ -46,14 +51,12 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     scatter: Annotated[
         float, Option(help="Standard deviation of the growth between two checks, as a part of it.")
     ] = 0.05,
-    clearance: Annotated[
-        list[str] | None, Option(help="Radial clearance of a new pin in mm, as in J2=0.1; may be repeated.")
-    ] = None,
+    clearance: Clearances = None,
     clearance_sd_mm: Annotated[
         float, Option("--clearance-sd-mm", help="Standard deviation of new clearances in mm.")
     ] = 0.01,
-    width_mm: Annotated[float, Option(help="Width of the bearings in mm.")] = 20.0,
-    bearing_share: Annotated[float, Option(help="Part of the wear that bearings take; journals take the rest.")] = 0.5,
+    width_mm: WidthMm = 20.0,
+    bearing_share: BearingShare = 0.5,
     noise_um: Annotated[float, Option(help="Standard deviation of one coordinate of a reading in um.")] = 10.0,
     poses: Annotated[int, Option(help="Number of poses of a check, at most 6.")] = 3,
     readings: Annotated[int, Option(help="Readings of each pose, each approached anew, at most 1000.")] = 5,
@@ -91,9 +94,8 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance plan-checks five-bar --path pick-and-place --k 1e-4 --limit 0.1 --horizon 2e7`
     """
-    import attrs
-
     from armwright.clearance.maintenance.assessment import plan_checks as planned
+    from armwright.clearance.maintenance.belief import WearPrior
     from armwright.clearance.maintenance.check_file import PastCheck, read_checks
     from armwright.clearance.maintenance.maintained_linkage import maintained_linkage
     from armwright.clearance.maintenance.strategy import Strategy
@@ -108,9 +110,10 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     if measurements is not None:
         warn_of_stray(measurements)
         checks = read_checks(measurements, model, columns=columns_of(columns), skip_incomplete=skip_incomplete)
-    prior = attrs.evolve(
-        _prior(model, k, pin_factor or []),
+    prior = WearPrior(
+        clearances=model.clearance_array(None),
         clearance_spread=clearance_sd_mm * 1e-3,
+        coefficients=_coefficients(model, k, pin_factor or []),
         spread=k_spread,
         pin_spread=pin_spread,
         grain=grain_um * 1e-6,
@@ -147,22 +150,13 @@ def plan_checks(  # noqa: PLR0917 - Typer reads one parameter per option
     print_result(plan, as_json=as_json, quiet=quiet, output=output)
 
 
-def _prior(model: "Linkage", k: float, factors: list[str]) -> "WearPrior":
-    """Return what the clearances of a linkage, a coefficient in mm³/(N m) and factors of pins say of new pins."""
+def _coefficients(model: "Linkage", k: float, factors: list[str]) -> "Array":
+    """Return (p,) the median wear coefficients [m²/N] that a coefficient in mm³/(N m) and factors of pins tell."""
     import numpy as np
 
-    from armwright.clearance.maintenance.belief import WearPrior
     from armwright.errors import one_of
 
     named = named_numbers(factors, ("",), "a pin and a factor, J3=2", "--pin-factor")
     for pin in named:
         one_of("pin", pin, model.clearances)
-    coefficients = [k * 1e-9 * (named[pin].value if pin in named else 1.0) for pin in model.clearances]
-    return WearPrior(
-        clearances=model.clearance_array(None),
-        clearance_spread=0.0,
-        coefficients=np.array(coefficients),
-        spread=0.0,
-        pin_spread=0.0,
-        grain=0.0,
-    )
+    return np.array([k * 1e-9 * (named[pin].value if pin in named else 1.0) for pin in model.clearances])

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import LinkageName, path_of, poses_of, with_clearances
-from armwright.cli.numbers import named_numbers, within
+from armwright.cli.linkages import LinkageName, SpeedRpm, WidthMm, path_of, poses_of, with_clearances
+from armwright.cli.numbers import named_numbers
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from armwright.reliability.linkage_assessment import WearStatement
     from armwright.reliability.linkage_errors import RandomClearances
 
-# Widths of bearings [mm].
-_WIDTHS = 1e-3, 1e4
 # Units of deviations, of which one need not be written.
 _UNITS = ("", "mm", "deg", "kg", "N")
 
@@ -39,7 +37,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             autocompletion=paths,
         ),
     ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    speed_rpm: SpeedRpm = None,
     poses: Annotated[int, Option(min=2, max=1000, help="Number of poses along the path.")] = 21,
     clearance: Annotated[
         list[str] | None, Option(help="Mean radial clearance of a pin in mm, as in J2=0.34; may be repeated.")
@@ -79,7 +77,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     k_each: Annotated[
         bool, Option("--k-each", help="Every pin has a wear coefficient of its own, independent of the others.")
     ] = False,
-    width_mm: Annotated[float, Option(help="Width of the bearings in mm.")] = 20.0,
+    width_mm: WidthMm = 20.0,
     arc_rad: Annotated[
         float | None, Option(help="Arc on which the wear is spread evenly, in rad; without it walls are worn.")
     ] = None,
@@ -136,7 +134,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             k=k * 1e-9,
             spread=k_spread,
             each=k_each,
-            width=within(width_mm, _WIDTHS, "--width-mm") * 1e-3,
+            width=width_mm * 1e-3,
             arc=arc_rad,
             steps=steps,
             limits={name: value * 1e-3 for name, value in limits.items() if value is not None},
@@ -178,7 +176,7 @@ def _deviations(model: "Linkage", named: dict[str, Any]) -> dict[str, float]:
         BadParameter: the unit of one is wrong.
     """
     from armwright.clearance.dimensions import dimensions_of
-    from armwright.reliability.linkage_assessment import SHOWN
+    from armwright.reliability.tolerances import SHOWN
 
     units = {dimension.name: dimension.unit for dimension in dimensions_of(model)}
     found = {}

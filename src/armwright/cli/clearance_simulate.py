@@ -5,12 +5,28 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, path_of, settings_of, with_clearances
+from armwright.cli.linkages import (
+    ClearanceOfAll,
+    Clearances,
+    ContactLawName,
+    ControlName,
+    Friction,
+    FrictionLawName,
+    FrictionVelocity,
+    IntegratorName,
+    LinkageName,
+    SpeedRpm,
+    Step,
+    Threshold,
+    TipPathName,
+    path_of,
+    settings_of,
+    with_clearances,
+)
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
-from armwright.cli.shell_completion import listed_in, paths
 
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
@@ -18,42 +34,24 @@ _SAMPLES, _SAMPLE = 2500, 1e-4
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    path: Annotated[
-        str | None,
-        Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
-    ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    path: TipPathName = None,
+    speed_rpm: SpeedRpm = None,
     revolutions: Annotated[float, Option(help="Number of revolutions of the drive.")] = 3.0,
-    clearance: Annotated[
-        list[str] | None, Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
-    ] = None,
-    clearance_mm: Annotated[
-        float | None, Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
-    ] = None,
-    friction: Annotated[
-        float | None, Option(help="Coefficient of friction; the default is that of the linkage.")
-    ] = None,
-    friction_law: Annotated[Literal["linear", "tanh", "lugre"], Option(help="Law of friction.")] = "linear",
+    clearance: Clearances = None,
+    clearance_mm: ClearanceOfAll = None,
+    friction: Friction = None,
+    friction_law: FrictionLawName = "linear",
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    law: Annotated[
-        str,
-        Option(
-            help="Contact law: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
-            autocompletion=listed_in("armwright.clearance.contact", "IMPACT_LAWS"),
-        ),
-    ] = "lankarani-nikravesh",
-    integrator: Annotated[Literal["rk4", "semi-implicit"], Option(help="Integrator.")] = "rk4",
-    step: Annotated[float, Option(help="Step of the integrator, in s.")] = 1e-5,
+    law: ContactLawName = "lankarani-nikravesh",
+    integrator: IntegratorName = "rk4",
+    step: Step = 1e-5,
     locate: Annotated[
         bool,
         Option("--locate", help="Locate the contact events: divide a step where a journal reaches its bearing."),
     ] = False,
     sample: Annotated[float | None, Option(help="Time between samples, in s; the default is 1e-4 or less.")] = None,
-    control: Annotated[
-        Literal["effort", "pd+ff"],
-        Option(help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward)."),
-    ] = "effort",
+    control: ControlName = "effort",
     start: Annotated[
         Literal["rest", "rigid", "centred"],
         Option(help="Initial state: rest on elastic bearings, rest on rigid ones, or centred."),

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
+from armwright.cli.linkages import FrictionVelocity, LinkageName, Step, Threshold, settings_of
 from armwright.cli.numbers import named_ranges
 from armwright.cli.options import Json, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
@@ -40,7 +40,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    step: Annotated[float, Option(help="Step of the integrator, in s.")] = 1e-5,
+    step: Step = 1e-5,
     replicates: Annotated[
         int,
         Option(

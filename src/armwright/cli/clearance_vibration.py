@@ -1,10 +1,26 @@
 """``armwright clearance vibration``: how a linkage with joint clearance rattles on its paths and after them."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from typer import Option
 
-from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, path_of, settings_of, with_clearances
+from armwright.cli.linkages import (
+    ClearanceOfAll,
+    Clearances,
+    ContactLawName,
+    ControlName,
+    Friction,
+    FrictionLawName,
+    FrictionVelocity,
+    IntegratorName,
+    LinkageName,
+    SpeedRpm,
+    Step,
+    Threshold,
+    path_of,
+    settings_of,
+    with_clearances,
+)
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import counting
@@ -18,7 +34,7 @@ def vibration(  # noqa: PLR0917 - Typer reads one parameter per option
         list[str] | None,
         Option(help="Path for the tip; may be repeated. The default is all 24 test paths.", autocompletion=paths),
     ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    speed_rpm: SpeedRpm = None,
     by: Annotated[
         str,
         Option(
@@ -31,31 +47,16 @@ def vibration(  # noqa: PLR0917 - Typer reads one parameter per option
         bool, Option("--aim", help="Search the move law of the path with the least loss in impacts, and correct it.")
     ] = False,
     goal_mm: Annotated[float, Option(help="With --aim: largest mean distance of the tip from its goal, in mm.")] = 0.05,
-    clearance: Annotated[
-        list[str] | None, Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
-    ] = None,
-    clearance_mm: Annotated[
-        float | None, Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
-    ] = None,
-    friction: Annotated[
-        float | None, Option(help="Coefficient of friction; the default is that of the linkage.")
-    ] = None,
-    friction_law: Annotated[Literal["linear", "tanh", "lugre"], Option(help="Law of friction.")] = "linear",
+    clearance: Clearances = None,
+    clearance_mm: ClearanceOfAll = None,
+    friction: Friction = None,
+    friction_law: FrictionLawName = "linear",
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    law: Annotated[
-        str,
-        Option(
-            help="Contact law: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
-            autocompletion=listed_in("armwright.clearance.contact", "IMPACT_LAWS"),
-        ),
-    ] = "lankarani-nikravesh",
-    integrator: Annotated[Literal["rk4", "semi-implicit"], Option(help="Integrator.")] = "rk4",
-    step: Annotated[float, Option(help="Step of the integrator, in s.")] = 1e-5,
-    control: Annotated[
-        Literal["effort", "pd+ff"],
-        Option(help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward)."),
-    ] = "effort",
+    law: ContactLawName = "lankarani-nikravesh",
+    integrator: IntegratorName = "rk4",
+    step: Step = 1e-5,
+    control: ControlName = "effort",
     output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,

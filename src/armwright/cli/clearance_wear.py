@@ -4,30 +4,33 @@ from typing import Annotated, Literal
 
 from typer import Option
 
-from armwright.cli.linkages import LinkageName, path_of, with_clearances
+from armwright.cli.linkages import (
+    BearingShare,
+    Clearances,
+    LinkageName,
+    SpeedRpm,
+    TipPathName,
+    WidthMm,
+    path_of,
+    with_clearances,
+)
 from armwright.cli.options import Json, OutputFolder, Quiet
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import counting
 from armwright.cli.results import write_results
-from armwright.cli.shell_completion import paths
 
 
 def wear(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     k: Annotated[float, Option("--k", help="Wear coefficient of Archard's law in mm³/(N m); take a measured one.")],
-    path: Annotated[
-        str | None,
-        Option(help="Path of a stroke: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
-    ] = None,
-    speed_rpm: Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    path: TipPathName = None,
+    speed_rpm: SpeedRpm = None,
     k_spread: Annotated[
         float, Option("--k-spread", help="Standard deviation of the logarithm of the wear coefficient.")
     ] = 0.5,
-    clearance: Annotated[
-        list[str] | None, Option(help="Radial clearance of a new pin in mm, as in J2=0.5; may be repeated.")
-    ] = None,
-    width_mm: Annotated[float, Option(help="Width of the bearings in mm.")] = 20.0,
-    bearing_share: Annotated[float, Option(help="Part of the wear that bearings take; journals take the rest.")] = 0.5,
+    clearance: Clearances = None,
+    width_mm: WidthMm = 20.0,
+    bearing_share: BearingShare = 0.5,
     pressure: Annotated[
         Literal["hertz", "winkler"],
         Option(help="Pressure: on the half-angle of a Hertz line contact, or of an elastic layer (Winkler)."),

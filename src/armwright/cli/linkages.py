@@ -7,7 +7,7 @@ from typer import Argument, Option
 
 from armwright.cli.numbers import named_numbers, numbers, within
 from armwright.cli.options import usage_error
-from armwright.cli.shell_completion import listed_in
+from armwright.cli.shell_completion import listed_in, paths
 from armwright.errors import InvalidValueError, counted
 
 if TYPE_CHECKING:
@@ -37,6 +37,36 @@ _DRIVES = {"--speed-rpm": 1, "--path": 2}
 _PLACES = -1e5, 1e5
 
 Threshold: TypeAlias = Annotated[float, Option(help="Sliding speed in mm/s below which friction is reduced towards 0.")]
+TipPathName: TypeAlias = Annotated[
+    str | None,
+    Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
+]
+SpeedRpm: TypeAlias = Annotated[float | None, Option(help="Speed of a linkage with one drive, in rev/min.")]
+Clearances: TypeAlias = Annotated[
+    list[str] | None, Option(help="Radial clearance of a pin in mm, as in J2=0.5; may be repeated.")
+]
+ClearanceOfAll: TypeAlias = Annotated[
+    float | None, Option(help="Radial clearance of all pins in mm; the default is that of the linkage.")
+]
+Friction: TypeAlias = Annotated[
+    float | None, Option(help="Coefficient of friction; the default is that of the linkage.")
+]
+FrictionLawName: TypeAlias = Annotated[Literal["linear", "tanh", "lugre"], Option(help="Law of friction.")]
+ContactLawName: TypeAlias = Annotated[
+    str,
+    Option(
+        help="Contact law: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
+        autocompletion=listed_in("armwright.clearance.contact", "IMPACT_LAWS"),
+    ),
+]
+IntegratorName: TypeAlias = Annotated[Literal["rk4", "semi-implicit"], Option(help="Integrator.")]
+Step: TypeAlias = Annotated[float, Option(help="Step of the integrator, in s.")]
+ControlName: TypeAlias = Annotated[
+    Literal["effort", "pd+ff"],
+    Option(help="Control of the drives: effort (open loop) or pd+ff (feedback with feedforward)."),
+]
+WidthMm: TypeAlias = Annotated[float, Option(min=1e-3, max=1e4, help="Width of the bearings in mm.")]
+BearingShare: TypeAlias = Annotated[float, Option(help="Part of the wear that bearings take; journals take the rest.")]
 
 
 def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float | None = None) -> "Linkage":

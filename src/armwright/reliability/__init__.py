@@ -1,4 +1,4 @@
-"""Tolerances and the accuracy that follows from them: bounds, probabilities, least cost."""
+"""Tolerances, probabilities of error and life of arms and linkages: bounds, laws, least cost, wear, measurements."""
 
 from armwright.lazy_namespace import attach
 

@@ -292,8 +292,8 @@ def assess(
         raise InvalidValueError(
             f"samples: expected at most {_SAMPLED // len(rows)} random mechanisms for so many poses, got {samples}"
         )
-    if limit is not None and not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
-        raise InvalidValueError(f"limit: expected {_LIMITS[0]:g} to {_LIMITS[1]:g} m, got {limit:g}")
+    if limit is not None:
+        check_limit(limit)
     say = progress or (lambda _: None)
     mechanism = mechanism_at(rows)
     error = mechanism.error
@@ -325,6 +325,16 @@ def assess(
         allocation=found,
         rule=allocation or "worst-case",
     )
+
+
+def check_limit(limit: float) -> None:
+    """Refuse a limit of the error [m] that no mechanism has.
+
+    Raises:
+        InvalidValueError: it is out of its range.
+    """
+    if not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
+        raise InvalidValueError(f"limit: expected {_LIMITS[0]:g} to {_LIMITS[1]:g} m, got {limit:g}")
 
 
 def _nonlinearity(error: LinearError, deviations: Array, sampled: Array) -> float:

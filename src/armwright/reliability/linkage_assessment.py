@@ -6,7 +6,6 @@ Source:
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -15,8 +14,8 @@ import attrs
 import numpy as np
 from scipy.special import chdtrc
 
-from armwright.arrays import Array, ArrayLike, integer, not_negative, positive
-from armwright.clearance.dimensions import DimensionUnit, dimensions_of
+from armwright.arrays import Array, ArrayLike, integer, not_negative
+from armwright.clearance.dimensions import dimensions_of
 from armwright.clearance.ideal import tip_position
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
@@ -25,27 +24,22 @@ from armwright.clearance.wear.worn_stroke import Stroke, lean
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
 from armwright.errors import InvalidValueError, counted
 from armwright.files.result_table import ResultTable
+from armwright.reliability.assessment import check_limit
 from armwright.reliability.linear_error import Estimate
 from armwright.reliability.linkage_errors import RandomClearances, RandomLinkage
 from armwright.reliability.linkage_life import PARTS, LinkageLife
 from armwright.reliability.linkage_wear import GapGrowth, Measure, WearingLinkage
+from armwright.reliability.tolerances import SHOWN
 from armwright.reliability.wear_measurements import MOST_STROKES, WearMeasurement, measured_residuals
 from armwright.reliability.weighted_draws import draw
 
-# What a user writes for a unit, and its SI value.
-SHOWN: Mapping[DimensionUnit, tuple[float, str]] = {
-    "m": (1e-3, "mm"),
-    "rad": (math.radians(1), "deg"),
-    "kg": (1.0, "kg"),
-    "N": (1.0, "N"),
-}
 # The linear law is said to be off where its errors differ by more from those of the equilibrium, in parts of their
 # spread; or where the probabilities of both differ by more than this many of the standard errors of the sample.
 _LINEAR, _SIGNIFICANT = 0.02, 3.0
 # A clearance that would be below 0 with a larger probability is worth a word.
 _BELOW_ZERO = 1e-9
-# Equilibria of a sample at most, poses, and limits of the error [m].
-_MOST_EQUILIBRIA, _MOST_POSES, _LIMITS = 2_000_000, 1000, (1e-12, 1e3)
+# Equilibria of a sample at most.
+_MOST_EQUILIBRIA = 2_000_000
 # Random linkages whose clearances alone are random, and others.
 _SAMPLES = 2000, 200
 # A step of the worn walls takes at most this part of a clearance.
@@ -383,8 +377,7 @@ def assess_linkage(
     linear, full = random.drawn_errors(z), random.equilibria(z, say)
     at_poses = on_path = beyond = None
     if limit is not None:
-        if not _LIMITS[0] <= positive(limit, "limit", "m") <= _LIMITS[1]:
-            raise InvalidValueError(f"limit: expected {_LIMITS[0]:g} to {_LIMITS[1]:g} m, got {limit:g}")
+        check_limit(limit)
         say("probabilities")
         at_poses, on_path = random.error.pose_probabilities(limit), random.error.path_probability(limit, seed=seed)
         over = [float((np.linalg.norm(x, axis=-1) > limit).any(axis=1).mean()) for x in (full, linear)]

@@ -21,9 +21,9 @@ from armwright.arrays import Array, ArrayLike, floats, not_negative, read_only
 from armwright.clearance.dimensions import dimensions_of
 from armwright.clearance.ideal import close_pins, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.plane_vectors import perpendicular, rotate
 from armwright.clearance.sensitivities import rest_sensitivities
 from armwright.clearance.static_equilibrium import find_static_equilibrium
-from armwright.clearance.wear.contact_history import rotate
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tip_errors import sampled_tip_errors
@@ -269,7 +269,7 @@ class RandomLinkage:
         """(p, 2, m) shift of the tip by the angle at which a journal lies beside its force, by its clearance."""
         rest = find_static_equilibrium(self.linkage, self.q, np.maximum(self.clearances.mean, _LEAST))
         ways = rest.gaps / np.linalg.norm(rest.gaps, axis=-1, keepdims=True)
-        sideways = np.stack([-ways[..., 1], ways[..., 0]], axis=-1)
+        sideways = perpendicular(ways)
         return np.asarray(np.einsum("pami,pmi->pam", tip_sensitivity(self.linkage, rest.q), sideways))
 
     def errors(self, clearances: Array, shifts: Array) -> Array:

@@ -10,11 +10,11 @@ from armwright.clearance.dimensions import Dimension, DimensionKind, dimensions_
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError
 from armwright.files.document import Document, Table
-from armwright.reliability.tolerances import Tolerance, Unit, read_costs, read_half_width
+from armwright.reliability.tolerances import SHOWN, Tolerance, Unit, read_costs, read_half_width
 
 # Stands for all dimensions of a table that are not named in it.
 _ALL = "all"
-_SI = {"mm": 1e-3, "deg": math.radians(1), "kg": 1.0, "N": 1.0}
+_SI = {unit: scale for scale, unit in SHOWN.values()}
 
 
 class _Kind(NamedTuple):

@@ -193,7 +193,11 @@ class WearingLinkage:
         )
 
     def repeatability(self, z: Array, strokes: Array) -> Array:
-        """Return (n, p) RP of ISO 9283 after strokes (n,) [m]; friction holds journals anywhere in their cones."""
+        """Return (n, p) RP of ISO 9283 after strokes (n,) [m]; friction holds journals anywhere in their cones.
+
+        It is the standard deviation of the tip times a factor, which is that of the mean new clearances at each pose.
+        Where wear shares the deviation otherwise among the pins, the factor is up to a tenth another one.
+        """
         lengths = self.growth.lengths_at(self.coefficients(z) * strokes[:, None])
         gaps = self.clearances(z)[:, None] + lengths
         gains, factors = self._friction
@@ -252,7 +256,7 @@ class WearingLinkage:
 
     @cached_property
     def _friction(self) -> tuple[Array, Array]:
-        """Variance of the tip by squared gap (p, m), and RP by the root of the variance (p,)."""
+        """Variance of the tip by squared gap (p, m), and RP by the root of the variance for mean clearances (p,)."""
         mean = self.random.clearances.mean
         across = self.random.across * self.random.cone
         tilts = np.random.default_rng(0).uniform(-1, 1, (_VISITS, len(mean)))

@@ -18,6 +18,13 @@ from armwright.files.document import Document, Table
 
 Unit: TypeAlias = Literal["m", "rad", "kg", "N"]
 
+# What a user writes for a unit, and its SI value.
+SHOWN: Mapping[Unit, tuple[float, str]] = {
+    "m": (1e-3, "mm"),
+    "rad": (math.radians(1), "deg"),
+    "kg": (1.0, "kg"),
+    "N": (1.0, "N"),
+}
 # A normal deviation is within its tolerance with the probability of three standard deviations.
 SIGMAS = 3.0
 _ANGLES = ("theta", "alpha", "beta")
@@ -58,9 +65,8 @@ class Tolerance:
     @property
     def displayed(self) -> tuple[float, str]:
         """The half width as a user writes it, and its unit."""
-        if self.unit == "m":
-            return self.half_width * 1e3, "mm"
-        return (math.degrees(self.half_width), "deg") if self.unit == "rad" else (self.half_width, self.unit)
+        scale, unit = SHOWN[self.unit]
+        return self.half_width / scale, unit
 
 
 def sampled_deviations(tolerances: Sequence[Tolerance], *, samples: int, seed: int = 0, uniform: bool = False) -> Array:

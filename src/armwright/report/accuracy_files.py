@@ -34,7 +34,7 @@ def accuracy_files(assessment: Assessment, *, title: str, command: str) -> dict[
                 Card("Conditions", pairs((name, assessment.about.get(key, "")) for key, name in CONDITIONS.items())),
                 Card("Characteristics", tables(assessment.tables(), symbols=(0,))),
                 *([Card("Figures", figures(drawn))] if drawn else []),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card("Files", downloads(beside, drawn)),
             ],
             numbers=_tiles(assessment),
             # Exceeded limits are said beside the heading.

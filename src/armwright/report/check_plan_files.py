@@ -34,7 +34,7 @@ def check_plan_files(plan: CheckPlan, *, command: str) -> dict[str, Any]:
             sections=[
                 Card("Plan", tables(plan.tables())),
                 Card("Figures", figures(drawn)),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card("Files", downloads(beside, drawn)),
             ],
             numbers=_tiles(plan),
             notes=plan.notes,

@@ -166,10 +166,11 @@ def figures(drawn: Iterable[Drawing | Film]) -> str:
     return '<div id="figures">' + "\n".join(drawing.element for drawing in drawn) + "</div>"
 
 
-def downloads(files: Mapping[str, str]) -> str:
-    """Return links to files that lie beside the page, each with what it holds."""
+def downloads(files: Mapping[str, str], drawings: Iterable[Drawing] = ()) -> str:
+    """Return links to files that lie beside the page, each with what it holds; figures by their captions to a colon."""
+    beside = {**files, **{f"{one.name}.svg": one.caption.partition(":")[0] for one in drawings}}
     items = (
         f'<li><a href="{html.escape(name)}" download>{html.escape(name)}</a><span>{html.escape(text)}</span></li>'
-        for name, text in files.items()
+        for name, text in beside.items()
     )
     return f'<ul class="files">{"".join(items)}</ul>'

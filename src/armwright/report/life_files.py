@@ -24,13 +24,12 @@ def life_files(life: ArmLife, *, command: str) -> dict[str, str]:
     cards = [Card("Life", tables(life.tables()))]
     if drawn:
         cards.append(Card("Figures", figures(drawn)))
-    names = {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn}
     return {
         "life.json": json.dumps(life.as_data(), indent=2, ensure_ascii=False) + "\n",
         "report.html": static_page(
             title=f"Life of {life.arm.name}",
             command=command,
-            sections=[*cards, Card("Files", downloads(beside | names))],
+            sections=[*cards, Card("Files", downloads(beside, drawn))],
             numbers=_tiles(life),
             notes=life.notes,
             warnings=(),

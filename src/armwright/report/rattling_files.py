@@ -6,10 +6,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.ideal import place_bodies, point_derivatives
 from armwright.clearance.linkage import BodyPoint, Linkage
-from armwright.clearance.placement import Placement, Vec2
+from armwright.clearance.placement import Placement
 from armwright.clearance.vibration.assessment import QUANTITIES, PathModes, RattlingAssessment
 from armwright.clearance.vibration.move_law import Aim
+from armwright.clearance.vibration.rattling import RUNS
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, curves, empty_figure, plain_axes, plain_label, svg_text
 from armwright.report.mode_shapes import MovingLine, mode_drawing
@@ -41,13 +43,12 @@ def rattling_files(assessment: RattlingAssessment, *, command: str) -> dict[str,
     if swinging:
         sections.append(Card("Mode shapes at rest in the middle of the path", figures(swinging), "magnified"))
     beside = {"vibration.json": "all numbers, in SI units"}
-    beside |= {f"{one.name}.svg": one.caption.partition(":")[0] for one in (*drawn, *swinging)}
-    sections.append(Card("Files", downloads(beside)))
-    paths = "paths" if several else assessment.rattlings[0].path.name
+    sections.append(Card("Files", downloads(beside, (*drawn, *swinging))))
+    paths = f"{len(assessment.rattlings)} paths" if several else assessment.rattlings[0].path.name
     return {
         "vibration.json": json.dumps({"command": command, **assessment.as_data()}, indent=2, ensure_ascii=False) + "\n",
         "report.html": static_page(
-            title=f"{assessment.linkage.name}: vibration on {len(assessment.rattlings) if several else ''} {paths}",
+            title=f"{assessment.linkage.name}: vibration on {paths}",
             command=command,
             sections=sections,
             numbers=_tiles(assessment),
@@ -94,7 +95,7 @@ def _ranking(assessment: RattlingAssessment) -> Drawing:
     axes.set_ylim(len(ranking) - 0.4, -0.6)
     axes.set_xlim(left=0.0)
     axes.legend(fontsize="small")
-    return Drawing("ranking", "Ranking of the paths: means and standard deviations over 16 runs", svg_text(figure))
+    return Drawing("ranking", f"Ranking of the paths: means and standard deviations over {RUNS} runs", svg_text(figure))
 
 
 def _frequencies(along: PathModes) -> Drawing:
@@ -112,32 +113,25 @@ def _frequencies(along: PathModes) -> Drawing:
 def _shapes(linkage: Linkage, along: PathModes) -> Iterator[Drawing]:
     """Give the mode shapes in the middle of the path, each in motion."""
     middle = len(along.time) // 2
-    q = along.modes.q[middle]
-    placement = Placement(linkage, list(q), [0.0] * len(q))
+    placement = place_bodies(linkage, along.modes.q[middle])
     frequencies, shapes = along.modes.frequencies[middle], along.modes.shapes[middle]
     for i, (frequency, shape) in enumerate(zip(frequencies, shapes.T, strict=True)):
-        lines = list(_moving_lines(linkage, placement, shape))
+        lines = list(_moving_lines(placement, shape))
         text = "not stable" if np.isnan(frequency) else f"{frequency:.1f} Hz"
         yield mode_drawing(f"mode-{i + 1}", f"Mode {i + 1}, {text}", lines)
 
 
-def _moving_lines(linkage: Linkage, placement: Placement, shape: Array) -> Iterator[MovingLine]:
-    for body in linkage.bodies:
-        points = [placement.point(BodyPoint(body.name, name)) for name in body.points]
-        moved = [_moved(point.partials, shape) for point in points]
-        yield MovingLine(np.array([[*point.position] for point in points], dtype=np.float64), np.array(moved))
-    for pin in linkage.pins:
-        bearing = placement.point(pin.bearing)
-        place = np.array([[*bearing.position]], dtype=np.float64)
-        yield MovingLine(place, np.array([_moved(bearing.partials, shape)]), ring=True)
+def _moving_lines(placement: Placement, shape: Array) -> Iterator[MovingLine]:
+    def line(points: list[BodyPoint], *, ring: bool = False) -> MovingLine:
+        places = np.array([[*placement.point(point).position] for point in points], dtype=np.float64)
+        return MovingLine(
+            places, np.array([point_derivatives(placement, point) @ shape for point in points]), ring=ring
+        )
 
-
-def _moved(partials: dict[int, Vec2], shape: Array) -> Array:
-    """Return (2,) the displacement of a point by a mode."""
-    moved = np.zeros(2)
-    for i, partial in partials.items():
-        moved += np.array(partial, dtype=np.float64) * shape[i]
-    return moved
+    for body in placement.linkage.bodies:
+        yield line([BodyPoint(body.name, name) for name in body.points])
+    for pin in placement.linkage.pins:
+        yield line([pin.bearing], ring=True)
 
 
 def _laws(aim: Aim) -> Drawing:

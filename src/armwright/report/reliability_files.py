@@ -33,7 +33,7 @@ def reliability_files(assessment: LinkageReliability, *, command: str) -> dict[s
     cards = [Card("Reliability", tables(assessment.tables()))]
     if drawn:
         cards.append(Card("Figures", figures(drawn)))
-    cards.append(Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})))
+    cards.append(Card("Files", downloads(beside, drawn)))
     return {
         "reliability.json": json.dumps({"command": command, **assessment.as_data()}, indent=2, ensure_ascii=False)
         + "\n",

@@ -38,7 +38,7 @@ def tolerance_files(assessment: ToleranceAssessment, *, command: str) -> dict[st
             sections=[
                 Card("Accuracy", tables(assessment.tables())),
                 Card("Figures", figures(drawn)),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card("Files", downloads(beside, drawn)),
             ],
             numbers=_tiles(assessment),
             notes=assessment.notes,

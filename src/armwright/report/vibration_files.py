@@ -41,7 +41,7 @@ def vibration_files(assessment: VibrationAssessment, *, command: str) -> dict[st
                     figures(swinging),
                     "magnified",
                 ),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in every})),
+                Card("Files", downloads(beside, every)),
             ],
             numbers=_tiles(assessment),
             notes=assessment.notes,

@@ -44,7 +44,7 @@ def wear_files(assessment: WearAssessment, *, command: str) -> dict[str, Any]:
             sections=[
                 Card("Life", tables(assessment.tables())),
                 Card("Figures", figures(drawn)),
-                Card("Files", downloads(beside | {f"{one.name}.svg": one.caption.partition(":")[0] for one in drawn})),
+                Card("Files", downloads(beside, drawn)),
             ],
             numbers=_tiles(assessment),
             notes=assessment.notes,
@@ -118,9 +118,9 @@ def _curves(assessment: WearAssessment) -> Drawing:
     figure, life = empty_figure((7.4, 4.4)), assessment.life
     axes = plain_axes(figure, "strokes", "error of the tip, mm")
     # The same error comes earlier or later, as the wear coefficient is; beyond the life nothing is known of it.
-    slow, *_, fast = (np.exp(-z * assessment.spread) for z in QUANTILES.values())
-    factors = np.geomspace(fast, slow, _BAND)
-    known = np.linspace(0.0, float(life.strokes[-1]) / slow, _BAND)
+    fast, *_, slow = (np.exp(-z * assessment.spread) for z in QUANTILES.values())
+    factors = np.geomspace(slow, fast, _BAND)
+    known = np.linspace(0.0, float(life.strokes[-1]) / fast, _BAND)
     for k, (name, (values, _)) in enumerate(life.measures().items()):
         axes.plot(life.strokes, values * 1e3, f"C{k}-", label=name)
         band = np.array([np.interp(factor * known, life.strokes, values) for factor in factors]) * 1e3

@@ -10,8 +10,9 @@ from scipy.stats import binom
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import RestMeasurement
 from armwright.clearance.estimation.model_errors import POWER, error_kinds, model_errors, resting_tips
-from armwright.clearance.estimation.static_estimate import closed_at_poses, estimate_at_rest, rest_offsets
+from armwright.clearance.estimation.static_estimate import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.poses import closed_at_tips
 from armwright.errors import ContradictionError
 from clearance.arms import ARM_A, STARTS
 from clearance.conftest import RANGE
@@ -31,7 +32,7 @@ def offsets_of_wrong_model(linkage: Linkage, poses: Array, c: Array, name: str, 
     """The offsets (k, 2) of the resting tip of an arm that exceeds its model by an amount of a model error."""
     kind = next(kind for kind in error_kinds(linkage) if kind.name == name)
     change = amount / kind.size
-    tips = resting_tips(kind.changed(change), linkage, closed_at_poses(linkage, poses), change * kind.zeros, c)
+    tips = resting_tips(kind.changed(change), linkage, closed_at_tips(linkage, poses), change * kind.zeros, c)
     return tips - poses
 
 

@@ -9,7 +9,6 @@ from armwright.arrays import Array
 from armwright.clearance.estimation import static_estimate
 from armwright.clearance.estimation.static_estimate import (
     Estimate,
-    closed_at_poses,
     estimate_at_rest,
     friction_scatter,
     rest_matrix,
@@ -18,10 +17,11 @@ from armwright.clearance.estimation.static_estimate import (
 from armwright.clearance.ideal import close_pins, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
+from armwright.clearance.plane_vectors import rotate
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
-from armwright.clearance.wear.contact_history import rotate
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 from samples import Sample
@@ -61,7 +61,7 @@ def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
     estimate = estimate_at_rest(five_bar, STARTS, offsets)
     linear = (
         offsets.reshape(100, -1)
-        @ np.linalg.pinv(rest_matrix(five_bar, closed_at_poses(five_bar, STARTS)).reshape(-1, 3)).T
+        @ np.linalg.pinv(rest_matrix(five_bar, closed_at_tips(five_bar, STARTS)).reshape(-1, 3)).T
     )
 
     assert accuracy(estimate.values, true).min() > WITHOUT_NOISE
@@ -99,7 +99,7 @@ def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
 
 def held_offsets(linkage: Linkage, poses: Array, clearances: Array, friction: float, rng: np.random.Generator) -> Array:
     """Offsets (..., k, 2) of tips at rest whose journals friction holds anywhere in their cones."""
-    q = closed_at_poses(linkage, poses)
+    q = closed_at_tips(linkage, poses)
     c = clearances[..., None, :]
     rest = find_static_equilibrium(linkage, q, c, contact_stiffness(linkage, c))
     angles = np.arctan(friction) * rng.uniform(-1.0, 1.0, rest.gaps.shape[:-1])
@@ -137,7 +137,7 @@ def test_scatter_by_friction(five_bar: Linkage, rng: np.random.Generator, fricti
     """The covariance of tips whose journals friction holds, and their mean, are those of random journals."""
     offsets = held_offsets(five_bar, STARTS[:1], np.tile(ARM_A, (2000, 1)), friction, rng)[:, 0]
 
-    scatter = friction_scatter(five_bar, closed_at_poses(five_bar, STARTS[:1]), ARM_A, friction)[0]
+    scatter = friction_scatter(five_bar, closed_at_tips(five_bar, STARTS[:1]), ARM_A, friction)[0]
 
     np.testing.assert_allclose(np.cov(offsets.T), scatter, atol=0.1 * np.trace(scatter))
     angle = np.arctan(friction)
@@ -161,7 +161,7 @@ def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) 
 )
 def test_singular_values(five_bar: Linkage, poses: Array, singular: tuple[float, ...]) -> None:
     """Three poses determine the worst combination of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
-    result = np.linalg.svd(rest_matrix(five_bar, closed_at_poses(five_bar, poses)).reshape(-1, 3), compute_uv=False)
+    result = np.linalg.svd(rest_matrix(five_bar, closed_at_tips(five_bar, poses)).reshape(-1, 3), compute_uv=False)
 
     np.testing.assert_allclose(result, singular, rtol=0, atol=PRINTED)
 
@@ -181,7 +181,7 @@ def test_deviations_of_the_spec(five_bar: Linkage) -> None:
 
 def test_map_at_the_first_goal(five_bar: Linkage) -> None:
     """At (-180, -600) mm a millimetre in J4 shifts the tip by 0.872 mm to the left and 0.313 mm down."""
-    result = rest_matrix(five_bar, closed_at_poses(five_bar, [(-0.18, -0.6)]))[0]
+    result = rest_matrix(five_bar, closed_at_tips(five_bar, [(-0.18, -0.6)]))[0]
 
     # The spec's numbers are those of arm A, where the tip hangs half a millimetre lower.
     np.testing.assert_allclose(result, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=1e-3)
@@ -197,7 +197,7 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
     columns = [(offset - own) / 1e-6 for offset in more]
     # At 10 µm of play what is not linear is a few parts in a hundred thousand.
     np.testing.assert_allclose(
-        np.stack(columns, axis=-1), rest_matrix(five_bar, closed_at_poses(five_bar, STARTS)), rtol=0, atol=1e-4
+        np.stack(columns, axis=-1), rest_matrix(five_bar, closed_at_tips(five_bar, STARTS)), rtol=0, atol=1e-4
     )
 
 
@@ -264,11 +264,10 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
     """However many rounds an estimate takes, the loops of each pose are closed one after the other only once."""
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     closings = []
-    closed_at_poses = static_estimate.closed_at_poses
     monkeypatch.setattr(
         static_estimate,
-        "closed_at_poses",
-        lambda *arguments: (closings.append(arguments), closed_at_poses(*arguments))[1],
+        "closed_at_tips",
+        lambda *arguments: (closings.append(arguments), closed_at_tips(*arguments))[1],
     )
 
     estimate_at_rest(five_bar, STARTS, offsets)
@@ -299,7 +298,7 @@ class TestIndeterminate:
         floating = attrs.evolve(five_bar, gravity=(0.0, 0.0), loads=())
 
         with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
-            rest_matrix(floating, closed_at_poses(floating, STARTS))
+            rest_matrix(floating, closed_at_tips(floating, STARTS))
         with pytest.raises(InvalidValueError, match="carries no force"):
             estimate_at_rest(floating, STARTS, np.zeros((3, 2)))
 
@@ -314,7 +313,7 @@ class TestIndeterminate:
     def test_freedoms(self, name: str, freedoms: str) -> None:
         """A linkage of one freedom cannot follow a position in the plane, and hears how many freedoms it has."""
         with pytest.raises(InvalidValueError, match=f"with its pins closed it has {freedoms}"):
-            rest_matrix(load_linkage(name), closed_at_poses(load_linkage(name), STARTS))
+            rest_matrix(load_linkage(name), closed_at_tips(load_linkage(name), STARTS))
 
     @pytest.mark.parametrize("noise", [0.0, -1e-6, np.inf, np.nan])
     def test_noise(self, five_bar: Linkage, noise: float) -> None:

@@ -19,9 +19,10 @@ from scipy.stats import chi2, f, ncf, ncx2
 
 from armwright.arrays import Array, ArrayLike
 from armwright.clearance.estimation.misfit import CONTRADICTION
-from armwright.clearance.estimation.static_estimate import Estimate, closed_at_poses, rest_matrix, whitening
+from armwright.clearance.estimation.static_estimate import Estimate, rest_matrix, whitening
 from armwright.clearance.ideal import close_pins
 from armwright.clearance.linkage import Body, Linkage
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError
@@ -84,7 +85,7 @@ def model_errors(
         estimate: from the readings there, without leading axes.
         noise_is_known: otherwise the residuals are taken for noise, and nothing contradicts the model.
     """
-    q = closed_at_poses(linkage, poses)
+    q = closed_at_tips(linkage, poses)
     white = whitening(estimate.scatter)
     B = (white @ rest_matrix(linkage, q)).reshape(-1, len(estimate.names))
     Q, _ = np.linalg.qr(B)

@@ -20,9 +20,10 @@ from scipy.optimize import nnls
 
 from armwright.arrays import Array, ArrayLike, Flags, floats, not_negative, positive
 from armwright.clearance.estimation.misfit import p_value, widening
-from armwright.clearance.ideal import close_pins, ideal_motion, tip_position, tip_sensitivity
+from armwright.clearance.ideal import ideal_motion, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.scenario import assembly_guess
+from armwright.clearance.plane_vectors import perpendicular
+from armwright.clearance.poses import closed_at_tips
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium, force_magnitudes
 from armwright.errors import InvalidValueError, ShapeError, TooFewError
@@ -144,7 +145,7 @@ def rest_matrix(linkage: Linkage, q: Array) -> Array:
 
     Args:
         linkage: with p pins.
-        q: (k, n) coordinates with closed pins; see ``closed_at_poses``.
+        q: (k, n) coordinates with closed pins; see ``closed_at_tips``.
 
     Returns:
         (k, 2, p) shift by clearance.
@@ -168,7 +169,7 @@ def friction_scatter(linkage: Linkage, q: Array, clearances: ArrayLike, friction
         (..., k, 2, 2) of each pose [m²].
     """
     direction, gains = _contact_directions(linkage, q), tip_sensitivity(linkage, q)
-    across = np.stack([-direction[..., 1], direction[..., 0]], axis=-1)
+    across = perpendicular(direction)
     mean, angle = _mean_part(friction), 2 * float(np.arctan(friction))
     # Of the cosine and the sine of an angle that is anywhere within ± atan μ with the same probability.
     shrinking = np.sinc(angle / np.pi) / 2
@@ -208,7 +209,7 @@ def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> A
         poses: (k, 2) positions of its tip without clearance [m].
         clearances: (..., p) [m].
     """
-    return _offsets_at(linkage, closed_at_poses(linkage, poses), floats(clearances, "clearances"))
+    return _offsets_at(linkage, closed_at_tips(linkage, poses), floats(clearances, "clearances"))
 
 
 def _offsets_at(linkage: Linkage, q: Array, clearances: Array) -> Array:
@@ -252,7 +253,7 @@ def estimate_at_rest(
     if not np.all(counts >= 1):
         raise InvalidValueError(f"readings: expected at least 1 of each pose, got {counts.min():g}")
     names = tuple(linkage.clearances)
-    q = closed_at_poses(linkage, positions)
+    q = closed_at_tips(linkage, positions)
     B = rest_matrix(linkage, q) * _mean_part(friction)
     singular = np.linalg.svd(B.reshape(-1, len(names)), compute_uv=False)
     if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
@@ -332,11 +333,3 @@ def _fit_clearances(  # noqa: PLR0917 - one system of equations
         new = step(c, residuals)
         converged, c = bool(np.abs(new - c).max() < _TOLERANCE), new
     return np.asarray(best, dtype=np.float64), np.asarray(smallest, dtype=np.float64)
-
-
-def closed_at_poses(linkage: Linkage, poses: ArrayLike) -> Array:
-    """Return (k, n) closed coordinates with the tip at each pose, each from the one before."""
-    configurations = [assembly_guess(linkage)]
-    for position in floats(poses, "poses").reshape(-1, 2):
-        configurations.append(close_pins(linkage, configurations[-1], tip=position))
-    return np.array(configurations[1:])

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import attrs
 import numpy as np
+from scipy.special import ndtri
 
 from armwright.arrays import Array, Numbers, integer, not_negative, positive
 from armwright.clearance.maintenance.maintained_linkage import GrowthTable
@@ -27,8 +28,6 @@ _TAILS = 6.0
 _FEWEST, _MOST = 100, 100_000
 # A logarithm within which no wear coefficient is bounded by rounding.
 _WIDEST = 5.0
-# A normal deviate of which nineteen in twenty are not larger.
-_DEVIATE = 1.6448536269514722
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -76,7 +75,7 @@ class WearPrior:
     @property
     def fastest(self) -> float:
         """The largest wear coefficient that has to be expected: nineteen in twenty are smaller [m²/N]."""
-        return float(self.coefficients.max() * np.exp(_DEVIATE * np.hypot(self.spread, self.pin_spread)))
+        return float(self.coefficients.max() * np.exp(ndtri(0.95) * np.hypot(self.spread, self.pin_spread)))
 
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Return (count, p) clearances [m] and logarithms of wear coefficients."""

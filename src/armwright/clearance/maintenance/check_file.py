@@ -15,11 +15,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import refuse_large_errors
-from armwright.clearance.estimation.static_estimate import closed_at_poses
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Measured
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
-from armwright.clearance.maintenance.strategy import read_offsets
+from armwright.clearance.maintenance.readings import read_offsets
+from armwright.clearance.poses import closed_at_tips
 from armwright.errors import UnknownNameError
 from armwright.files.column_names import LENGTH, NUMBER, Column, Schema
 from armwright.files.limits import limit, limit_message
@@ -69,7 +69,7 @@ class RestCheck:
         Raises:
             InvalidValueError: a pose cannot be reached, or a pin carries no force there.
         """
-        poses = Places.of(machine.linkage, closed_at_poses(machine.linkage, self.poses))
+        poses = Places.of(machine.linkage, closed_at_tips(machine.linkage, self.poses))
         return read_offsets(machine, poses, self.offsets[None], self.readings, noise, believed[None])[0]
 
 

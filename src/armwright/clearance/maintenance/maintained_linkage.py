@@ -18,22 +18,20 @@ import numpy as np
 
 from armwright.arrays import Array, integer, positive
 from armwright.clearance.correction import predict_contact_loss
+from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.ideal import close_pins, inverse_dynamics, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.static_equilibrium import force_magnitudes
-from armwright.clearance.wear.contact_history import rotate
-from armwright.clearance.wear.life import wearing_clearances
-from armwright.clearance.wear.worn_stroke import Stroke, lean, leaning_growth
-from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
+from armwright.clearance.wear.worn_stroke import Stroke, lean_new, leaning_growth
+from armwright.clearance.wear.worn_surfaces import BROKEN, WearLaw, wearing_clearances
 from armwright.errors import InvalidValueError
 
 # Moments of a stroke: at which its wear is integrated, and at which the error of its tip counts beside its goals.
 _MOMENTS, _WATCHED = 81, 9
 # Clearances at which the growth is tabulated, and bins whose depth is less than this part of the deepest are not worn.
 _LEVELS, _WORN = 6, 1e-3
-# Growth beyond this part of the radius of a journal is not tabulated.
-_BROKEN = 0.5
 # Candidates for the poses of a check along each axis, in the box round the path, which is at least so wide [m].
 _CANDIDATES, _LEAST_BOX = 6, 0.2
 # Of a drive, for the derivative of the tip [rad, m].
@@ -81,7 +79,7 @@ class Places:
             qdd=accelerations,
             tip=tip_position(linkage, q),
             along=np.einsum("mipj,mpj->mip", gains, directions),
-            across=np.einsum("mipj,mpj->mip", gains, rotate(directions, np.full(directions.shape[:-1], np.pi / 2))),
+            across=np.einsum("mipj,mpj->mip", gains, perpendicular(directions)),
         )
 
     def friction_covariance(self, clearances: Array, cone: float) -> Array:
@@ -177,11 +175,12 @@ def maintained_linkage(
         poses: at which a check holds the arm.
 
     Raises:
-        InvalidValueError: the path cannot be followed, a pin does not wear, or no poses are left.
+        InvalidValueError: the path cannot be followed, a pin does not wear, a body is elastic, or no poses are left.
     """
-    c = wearing_clearances(linkage)
     if integer(poses, "poses", least=1) > _MAX_POSES:
         raise InvalidValueError(f"poses: expected 1 to {_MAX_POSES}, got {poses}")
+    refuse_rods("plan of checks", linkage.rods)
+    c = wearing_clearances(linkage)
     unit = attrs.evolve(law or WearLaw(coefficient=1.0), coefficient=1.0)
     stroke = Stroke.of(linkage, path, _MOMENTS)
     watched, left_out = _watched(linkage, path, stroke)
@@ -209,12 +208,10 @@ def maintained_linkage(
 def _tabulate(stroke: Stroke, law: WearLaw, clearances: Array, exposure: float) -> tuple[GrowthTable, Array]:
     """Return growth along the life that equal wear coefficients lead to, and (p,) the depth by work half way."""
     first = _growth(stroke, law, clearances)
-    if not np.all(first.rates > 0):
-        raise InvalidValueError(f"{stroke.linkage.name}: nothing slides in its pins on path {stroke.name}")
     radii = np.array([pin.journal_radius for pin in stroke.linkage.pins])
     far = exposure * first.rates
-    # Worn-through pins are beyond any plan.
-    far *= min(1.0, float((_BROKEN * radii / far).min()))
+    # Broken pins are beyond any plan.
+    far *= min(1.0, float((BROKEN * radii / far).min()))
     levels = clearances + np.linspace(0.0, 1.0, _LEVELS)[:, None] * far
     growths = [first, *(_growth(stroke, law, level) for level in levels[1:])]
     middle = growths[_LEVELS // 2]
@@ -229,7 +226,7 @@ class _Growth(NamedTuple):
 def _growth(stroke: Stroke, law: WearLaw, clearances: Array) -> _Growth:
     """Return (p,) the mean depth of what a stroke wears on both surfaces, for clearances (p,), and (p,) its F ds."""
     linkage = stroke.linkage.with_clearances(dict(zip(stroke.linkage.clearances, clearances, strict=True)))
-    leaning = lean(attrs.evolve(stroke, linkage=linkage), law, WornSurfaces.new(len(linkage.pins), law.bins))
+    leaning = lean_new(attrs.evolve(stroke, linkage=linkage), law)
     growth = leaning_growth(law, linkage, leaning)
     rates = np.zeros(len(clearances))
     for surfaces in (growth.bearing, growth.journal):

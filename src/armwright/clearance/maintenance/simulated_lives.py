@@ -21,10 +21,12 @@ from armwright.clearance.ideal import IdealMotion, close_pins, inverse_dynamics,
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Belief
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
-from armwright.clearance.maintenance.strategy import NextStop, Planner, read_offsets
+from armwright.clearance.maintenance.readings import read_offsets
+from armwright.clearance.maintenance.strategy import NextStop, Planner
+from armwright.clearance.plane_vectors import rotate
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import force_magnitudes
-from armwright.clearance.wear.contact_history import leaning_slips, pin_angles, rotate
+from armwright.clearance.wear.contact_history import leaning_slips, pin_angles
 from armwright.errors import InvalidValueError
 
 # Between two stops the error is looked at after so many numbers of strokes, each time of so many visits.

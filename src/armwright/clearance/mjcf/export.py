@@ -19,6 +19,7 @@ from armwright.clearance.drive_tables import csv_text, drive_table
 from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.ideal import tip_position
 from armwright.clearance.linkage import GROUND, Body, BodyPoint, Coordinate, Guide, Linkage, Pin
+from armwright.clearance.plane_vectors import rotate
 from armwright.clearance.scenario import Scenario
 from armwright.errors import InvalidValueError
 
@@ -150,7 +151,7 @@ def _add_body(elements: dict[str, Element], linkage: Linkage, body: Body, radius
     angle = joint.angle if isinstance(joint, Guide) else 0.0
     own = body.centre if joint is None else body.points[joint.point]
     on = np.zeros(2) if joint is None else linkage.point(joint.on)
-    position = on - _rotated(own, angle)
+    position = on - rotate(own, np.asarray(angle))
     carrier = elements[GROUND if joint is None else joint.on.body]
     element = SubElement(carrier, "body", name=body.name, pos=_vector(position), euler=_numbers([0.0, 0.0, angle]))
     inertia = body.inertia or _NO_INERTIA
@@ -203,11 +204,6 @@ def _check_names(linkage: Linkage) -> None:
             raise InvalidValueError(
                 f"body {name!r}: expected a name other than 'world' and without a colon, for a model of MuJoCo"
             )
-
-
-def _rotated(point: Array, angle: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array((c * point[0] - s * point[1], s * point[0] + c * point[1]))
 
 
 def _vector(point: Iterable[float]) -> str:

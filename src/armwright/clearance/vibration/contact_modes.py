@@ -3,6 +3,7 @@
 A journal at rest indents its wall, and a little more force indents it a little more: across the wall a pin is a spring,
 the slope of the Hertz force. Along the wall a journal rolls like a pendulum as long as the clearance. The frequencies
 are those of the linkage on these springs, with its weights; friction, which hinders the rolling, is left out.
+``natural_modes`` has those of elastic rods between pins that stay closed.
 
     H v = ω² M v,    H = ∂²V / ∂q²
 
@@ -19,6 +20,7 @@ from armwright.clearance.equations import free_forces
 from armwright.clearance.ideal import gap_derivatives, mass_matrices, place_bodies, stack
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement
+from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.settings import contact_stiffness
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 
@@ -84,7 +86,7 @@ def contact_modes(linkage: Linkage, closed: ArrayLike, clearances: ArrayLike | N
 def _stiffness_matrix(linkage: Linkage, q: Array, gaps: Array, forces: Array, slopes: Array) -> Array:
     """Return (m, n, n) second derivatives of the energy of weights, loads and contacts at rest."""
     outward = gaps / np.linalg.norm(gaps, axis=-1, keepdims=True)
-    along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+    along = perpendicular(outward)
     G = _gap_jacobians(place_bodies(linkage, q))
     tension = (forces / np.linalg.norm(gaps, axis=-1))[..., None, None]
     springs = slopes[..., None, None] * _outer(outward) + tension * _outer(along)

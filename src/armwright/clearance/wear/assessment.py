@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
+from scipy.special import ndtri
 
 from armwright.arrays import Array, in_range, positive
 from armwright.clearance.elastic_rod import refuse_rods
@@ -30,9 +31,8 @@ from armwright.files.result_table import ResultTable
 
 # Of the steps of a simulation, so that no impact is missed [s]; and indistinguishable runs of it.
 _SAMPLE, _RUNS = 1e-5, 8
-# A normal deviate of which nineteen in twenty are not larger, and its quantiles by name.
-_DEVIATE = 1.6448536269514722
-QUANTILES: Mapping[str, float] = {"5 %": -_DEVIATE, "50 %": 0.0, "95 %": _DEVIATE}
+# Quantiles of a normal deviate by name.
+QUANTILES: Mapping[str, float] = {f"{100 * part:g} %": float(ndtri(part)) for part in (0.05, 0.5, 0.95)}
 _DEPTHS = ("bearing_depth", "bearing_depth_error", "journal_depth", "journal_depth_error")
 # Standard deviation of the logarithm of a wear coefficient of which something is known.
 _WIDEST = 5.0

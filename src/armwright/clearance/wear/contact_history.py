@@ -18,6 +18,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.ideal import place_bodies
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.plane_vectors import perpendicular, rotate
 from armwright.clearance.simulation import Simulation
 from armwright.errors import InvalidValueError
 
@@ -123,15 +124,9 @@ def leaning_slips(linkage: Linkage, time: Array, gaps: Array, angles: PinAngles)
     return _slips(linkage, gaps, outward, np.gradient(gaps, time, axis=-3), angles)
 
 
-def rotate(vectors: Array, angles: Array) -> Array:
-    """Return vectors (..., 2) rotated by angles (...) [rad]."""
-    c, s = np.cos(angles), np.sin(angles)
-    return np.stack([c * vectors[..., 0] - s * vectors[..., 1], s * vectors[..., 0] + c * vectors[..., 1]], axis=-1)
-
-
 def _slips(linkage: Linkage, gaps: Array, outward: Array, velocities: Array, angles: PinAngles) -> Array:
     """Return (..., s, p) velocities of the surfaces of journals along walls of these normals (..., s, p, 2)."""
     radii = np.array([pin.journal_radius for pin in linkage.pins])
-    along = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+    along = perpendicular(outward)
     wall = radii + (gaps * outward).sum(axis=-1)
     return np.asarray((velocities * along).sum(axis=-1) + angles.journal_spin * radii - angles.bearing_spin * wall)

@@ -14,19 +14,14 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, integer, not_negative, positive
-from armwright.clearance.linkage import Linkage
-from armwright.clearance.wear.worn_stroke import Stroke, lean, leaning_growth, peak_pressures, tip_errors
-from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces
+from armwright.clearance.wear.worn_stroke import Stroke, lean, lean_new, leaning_growth, peak_pressures, tip_errors
+from armwright.clearance.wear.worn_surfaces import BROKEN, WearLaw, WornSurfaces, surfaces_between, wearing_clearances
 from armwright.errors import InvalidValueError
 
 # A step takes at most this part of the clearance of a pin.
 MAX_STEP = 0.02
 # Steps of a life at most; a step is made anew until the compliance of its wear is right to about this part.
 _MAX_STEPS, _RIGHT, _TRIES = 2000, 0.03, 12
-# A smaller clearance is none, and its walls have no direction in which they wear [m].
-_LEAST_CLEARANCE = 1e-9
-# Depths beyond this part of the radius of a journal are no wear but a broken pin.
-_BROKEN = 0.5
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -81,11 +76,7 @@ class WearLife:
         end = float(self.strokes[-1])
         if not_negative(strokes, "strokes") > end:
             raise InvalidValueError(f"strokes: expected at most {end:.4g}, which the life lasts, got {strokes:g}")
-        k = int(np.clip(np.searchsorted(self.strokes, strokes) - 1, 0, len(self.strokes) - 2))
-        first, second = self.surfaces[k : k + 2]
-        part = (strokes - self.strokes[k]) / (self.strokes[k + 1] - self.strokes[k])
-        growth = WornSurfaces(bearing=second.bearing - first.bearing, journal=second.journal - first.journal)
-        return first.plus(growth, part)
+        return surfaces_between(self.strokes, self.surfaces, strokes)
 
     def strokes_to(self, measure: str, limit: float) -> float:
         """Return the strokes after which a measure passes a limit [m]; 0 for a new linkage beyond it, else infinite."""
@@ -131,14 +122,11 @@ def wear_life(
     surfaces = WornSurfaces.new(len(linkage.pins), law.bins)
     states, strokes, works, volumes = [surfaces], [0.0], [], [np.zeros(len(c))]
     errors = [tip_errors(stroke, law, surfaces)]
-    new = lean(stroke, law, surfaces)
-    if not np.all(new.history.work > 0):
-        raise InvalidValueError(f"{linkage.name}: nothing slides in its pins on path {stroke.name}")
-    softening = depth / peak_pressures(law, linkage, new)
+    softening = depth / peak_pressures(law, linkage, lean_new(stroke, law))
     for step in range(steps):
         count, growth, work, softening = _step(stroke, law, surfaces, depth, softening, remaining=until - strokes[-1])
         surfaces = surfaces.plus(growth, count)
-        if np.any(surfaces.deepest() > _BROKEN * radii):
+        if np.any(surfaces.deepest() > BROKEN * radii):
             raise InvalidValueError(f"{linkage.name}: after {strokes[-1] + count:.3g} strokes a pin is worn through")
         works.append(work)
         volumes.append(volumes[-1] + count * law.coefficient * works[-1])
@@ -160,22 +148,6 @@ def wear_life(
         repeatability=np.stack([x.repeatability for x in errors]),
         path=np.stack([x.path for x in errors]),
     )
-
-
-def wearing_clearances(linkage: Linkage) -> Array:
-    """Return (p,) the clearances of pins that can wear [m].
-
-    Raises:
-        InvalidValueError: there are none, or one is too small.
-    """
-    if not linkage.pins:
-        raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
-    c = linkage.clearance_array(None)
-    if not np.all(c >= _LEAST_CLEARANCE):
-        raise InvalidValueError(
-            f"clearances: wear needs them at least {_LEAST_CLEARANCE * 1e3:g} mm, got {c.min() * 1e3:g} mm"
-        )
-    return c
 
 
 def _step(

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from armwright.arrays import Array, evenly_spread, floats, not_negative
+from armwright.arrays import evenly_spread, floats, not_negative
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.wear.life import WearLife
-from armwright.clearance.wear.worn_surfaces import FEWEST_BINS, MOST_BINS, WornSurfaces
+from armwright.clearance.wear.worn_surfaces import FEWEST_BINS, MOST_BINS, WornSurfaces, surfaces_between
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError
 from armwright.files.inputs import read_text
 
@@ -85,17 +85,9 @@ def read_worn_surfaces(path: Path, linkage: Linkage, strokes: float | None = Non
     at = float(known[-1]) if strokes is None else not_negative(strokes, "strokes")
     if not known[0] <= at <= known[-1]:
         raise InvalidValueError(f"strokes: expected {known[0]:.4g} to {known[-1]:.4g}, as in {path}, got {at:g}")
-    bearing, journal = (_between(side[order], known, at) for side in sides)
-    return WornSurfaces(bearing=bearing, journal=journal), at
-
-
-def _between(side: Array, strokes: Array, at: float) -> Array:
-    """Return (p, m) depths between those of states (p, n, m)."""
-    k = int(np.clip(np.searchsorted(strokes, at) - 1, 0, max(len(strokes) - 2, 0)))
-    if len(strokes) == 1:
-        return side[:, 0]
-    part = (at - strokes[k]) / (strokes[k + 1] - strokes[k])
-    return np.asarray((1 - part) * side[:, k] + part * side[:, k + 1])
+    bearings, journals = (np.swapaxes(side[order], 0, 1) for side in sides)
+    worn = [WornSurfaces(bearing=b, journal=j) for b, j in zip(bearings, journals, strict=True)]
+    return surfaces_between(known, worn, at), at
 
 
 def _rounded(depth: float) -> float:

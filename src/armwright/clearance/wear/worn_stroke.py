@@ -21,10 +21,12 @@ from armwright.clearance.ideal import (
 )
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
+from armwright.clearance.plane_vectors import rotate
 from armwright.clearance.scenario import assembly_guess, close_pins_along
-from armwright.clearance.wear.contact_history import ContactHistory, leaning_slips, pin_angles, rotate
+from armwright.clearance.wear.contact_history import ContactHistory, leaning_slips, pin_angles
 from armwright.clearance.wear.foundation import rest_positions
 from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces, stroke_growth
+from armwright.errors import InvalidValueError
 
 # The direction of a force and the position of its journal depend a little on each other: so often they are found anew.
 _ROUNDS = 3
@@ -125,6 +127,18 @@ def lean(stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, softening: Array 
         rotations=angles.journal - angles.bearing,
     )
     return Leaning(rest.q, history, rest.shares)
+
+
+def lean_new(stroke: Stroke, law: WearLaw) -> Leaning:
+    """Return how the journals of new pins lie and slide over a stroke.
+
+    Raises:
+        InvalidValueError: nothing slides in a pin.
+    """
+    leaning = lean(stroke, law, WornSurfaces.new(len(stroke.linkage.pins), law.bins))
+    if not np.all(leaning.history.work > 0):
+        raise InvalidValueError(f"{stroke.linkage.name}: nothing slides in its pins on path {stroke.name}")
+    return leaning
 
 
 def leaning_growth(law: WearLaw, linkage: Linkage, leaning: Leaning) -> WornSurfaces:

@@ -8,6 +8,7 @@ Source:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import attrs
@@ -25,8 +26,12 @@ PRESSURES: tuple[Pressure, ...] = ("hertz", "winkler")
 FEWEST_BINS, MOST_BINS = 36, 3600
 # A contact narrower than two bins to each side is made as wide: no profile tells it.
 _NARROWEST = 2
+# A smaller clearance is none, and its walls have no direction in which they wear [m].
+_LEAST_CLEARANCE = 1e-9
 # Wear coefficients, to that of the growth by unit of it [mm³/(N m)]; widths and layers [mm].
 _COEFFICIENTS, _LENGTHS = (1e-15, 1e9), (1e-3, 1e5)
+# Depths beyond this part of the radius of a journal are no wear but a broken pin.
+BROKEN = 0.5
 
 
 @attrs.frozen(kw_only=True)
@@ -113,6 +118,38 @@ class WornSurfaces:
     def deepest(self) -> Array:
         """Return (p,) the largest depth of each pin, on either surface [m]."""
         return np.asarray(np.maximum(self.bearing.max(axis=-1), self.journal.max(axis=-1)))
+
+
+def surfaces_between(strokes: Array, states: Sequence[WornSurfaces], at: float) -> WornSurfaces:
+    """Return the surfaces of a life after some strokes; between its states depths grow evenly.
+
+    Args:
+        strokes: (n,) increasing, at each state.
+        states: n of them.
+        at: strokes between the first and the last.
+    """
+    k = int(np.clip(np.searchsorted(strokes, at), 1, len(states))) - 1
+    if k == len(states) - 1:
+        return states[k]
+    first, second = states[k : k + 2]
+    growth = WornSurfaces(bearing=second.bearing - first.bearing, journal=second.journal - first.journal)
+    return first.plus(growth, float((at - strokes[k]) / (strokes[k + 1] - strokes[k])))
+
+
+def wearing_clearances(linkage: Linkage) -> Array:
+    """Return (p,) the clearances of pins that can wear [m].
+
+    Raises:
+        InvalidValueError: there are no pins, or a clearance is too small.
+    """
+    if not linkage.pins:
+        raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
+    c = linkage.clearance_array(None)
+    if not np.all(c >= _LEAST_CLEARANCE):
+        raise InvalidValueError(
+            f"clearances: wear needs them at least {_LEAST_CLEARANCE * 1e3:g} mm, got {c.min() * 1e3:g} mm"
+        )
+    return c
 
 
 def stroke_growth(law: WearLaw, radii: Array, loads: Array, shares: Array, rotations: Array) -> WornSurfaces:
