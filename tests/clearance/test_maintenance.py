@@ -1,5 +1,6 @@
 """Plans of checks: the filter against dense grids, forecasts against closed forms, and lives of another linkage."""
 
+import math
 from itertools import islice
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from armwright.clearance.maintenance.maintained_linkage import GrowthTable, Main
 from armwright.clearance.maintenance.readings import read_offsets
 from armwright.clearance.maintenance.simulated_lives import coupled_rates, leaning_tips
 from armwright.clearance.maintenance.strategy import Planner, Strategy
-from armwright.clearance.paths import named_path
+from armwright.clearance.paths import constant_speed_path, named_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import ContradictionError, FileFormatError, InvalidValueError
@@ -291,6 +292,19 @@ def test_strategies_that_are_none(changes: dict[str, float], message: str) -> No
     """Numbers out of range give one clear error."""
     with pytest.raises(InvalidValueError, match=message):
         strategy(**changes)
+
+
+def test_no_correction_at_a_dead_centre() -> None:
+    """A single drive takes away the error of a slider but where its crank hardly moves it."""
+    linkage = load_linkage("slider-crank")
+    path = constant_speed_path("turn", math.radians(6), 2 * math.pi, 1.0)
+    machine = maintained_linkage(linkage, path, exposure=1e-9)
+
+    crank = machine.watched.q[:, linkage.driven[0]]
+    near = np.abs(np.sin(crank)) < 0.2
+    assert near.any()
+    np.testing.assert_array_equal(machine.aim[near], 0.0)
+    np.testing.assert_allclose(machine.aim[~near, 0, 0], 1.0)
 
 
 def test_what_cannot_be_maintained(five_bar: Linkage) -> None:

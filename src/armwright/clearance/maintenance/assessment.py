@@ -178,9 +178,10 @@ class CheckPlan:
         if self.due:
             notes.append(f"change now: {', '.join(self.due)}; a correction of the path helps no longer")
         stops, until = self.planned.stops, f"until {strategy.horizon:.4g} strokes, of {len(self.planned.lives)} lives"
+        command = ": armwright clearance correct --clearance PIN=MM" if self.machine.by_tip else ""
         notes += [
             f"expected stops: {stops.mean():.3g} ± {standard_error(stops):.2g} {until}",
-            "correct the path for the clearances of the table: armwright clearance correct --clearance PIN=MM",
+            f"correct the path for the clearances of the table{command}",
             "errors are those of journals that lie at their walls, anywhere in their friction cones, without impacts",
         ]
         if self.machine.left_out:

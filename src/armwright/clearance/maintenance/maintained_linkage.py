@@ -36,6 +36,9 @@ _LEVELS, _WORN = 6, 1e-3
 _CANDIDATES, _LEAST_BOX = 6, 0.2
 # Of a drive, for the derivative of the tip [rad, m].
 _STEP = 1e-5
+# A single drive that moves the tip by less than this part of the most on the path is near a dead centre: a correction
+# would move it far, along a curve.
+_ABLE = 0.25
 # Poses that move the tip by more for a clearance are near a singular configuration.
 _REGULAR = 3.0
 _MAX_POSES = 6
@@ -187,6 +190,9 @@ def maintained_linkage(
     table, depth_by_work = _tabulate(stroke, unit, c, positive(exposure, "exposure", "m²/N"))
     by_drives = _tip_by_drives(linkage, watched.q)
     inverse: Array = np.linalg.pinv(by_drives, rcond=1e-6).astype(np.float64)
+    if len(linkage.drives) == 1:
+        gains = np.linalg.norm(by_drives, axis=-2, keepdims=True)
+        inverse[np.broadcast_to(gains < _ABLE * gains.max(), inverse.shape)] = 0.0
     return MaintainedLinkage(
         linkage=linkage,
         law=unit,

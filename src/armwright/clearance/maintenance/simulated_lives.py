@@ -36,6 +36,8 @@ _ROUNDS = 3
 # Of the posterior of the wear coefficients.
 _LEVEL = 0.9
 _MOST_LIVES = 10_000
+# Scatters, and grains [m], that are no larger make no difference.
+_NONE = 1e-12
 # After so many stops they help no longer: then they are at least intervals apart.
 _MANY = 30
 # What is so near to the horizon is at it, but for rounding.
@@ -218,10 +220,10 @@ class _Population:
         part, slope = (moments / end)[..., None], (last - first)[:, None]
         mean = np.diff(moments[..., None] * k[:, None] * (first[:, None] + slope * part / 2), axis=1, prepend=0.0)
         grain, scatter = self._prior.grain, self._prior.scatter
-        if scatter > 0:
+        if scatter > _NONE:
             # Of the whole interval, with a mean of one.
             mean *= self._rng.gamma(scatter**-2, scatter**2, (len(rows), 1, mean.shape[-1]))
-        grown = self._rng.gamma(mean / grain, grain) if grain > 0 else mean
+        grown = self._rng.gamma(mean / grain, grain) if grain > _NONE else mean
         history: Array = now[:, None] + grown.cumsum(axis=1)
         self.clearances[rows] = history[:, -1]
         return history
