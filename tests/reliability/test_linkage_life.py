@@ -77,7 +77,7 @@ def test_published_life() -> None:
 
 
 @pytest.mark.parametrize("each", [False, True])
-def test_intervals_for_the_wear_coefficient(each: bool) -> None:
+def test_intervals_for_the_wear_coefficient(*, each: bool) -> None:
     """Ends of the 90 % interval of a quantile are that quantile with the coefficient at its 95 and its 5 % quantile."""
     linkage = wearing(1e-5, each=each)
     worn = MEAN + np.array([5e-5, 0, 0])
