@@ -97,6 +97,26 @@ def not_negative(value: float, what: str, unit: str = "") -> float:
     return _within_largest(result, what, unit)
 
 
+def in_range(value: float, bounds: tuple[float, float], what: str, unit: str = "") -> float:
+    """Return a number within bounds as a float; messages name its unit, if it has one.
+
+    Args:
+        value: the number.
+        bounds: the smallest and the largest that are allowed.
+        what: its name in a message.
+        unit: of the number and the bounds.
+
+    Raises:
+        KindError: the value is not a real number.
+        InvalidValueError: it is out of the bounds.
+    """
+    result, (low, high) = number(value, what), bounds
+    if not low <= result <= high:  # not fulfilled by NaN
+        expected, got = f"{low:g} to {high:g} {unit}".strip(), f"{result:g} {unit}".strip()
+        raise InvalidValueError(f"{what}: expected {expected}, got {got}")
+    return result
+
+
 def _within_largest(value: float, what: str, unit: str) -> float:
     if value > LARGEST:
         raise InvalidValueError(f"{what}: expected no more than {f'{LARGEST:g} {unit}'.strip()}, got {value}")

@@ -158,6 +158,7 @@ class TestWhatItCannotBe:
             ({"clearance": -1e-4}, "pin J2: clearance: expected 0 or more, got -0.0001"),
             ({"clearance": np.nan}, "pin J2: clearance"),
             ({"journal_radius": 0.0}, "pin J2: journal radius: expected more than 0, got 0"),
+            ({"journal_radius": 1e-308}, "pin J2: journal radius: expected 0.001 to 100000 mm, got 1e-305 mm"),
         ],
     )
     def test_radii(self, five_bar: Linkage, wrong: dict[str, float], message: str) -> None:

@@ -268,6 +268,9 @@ def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
     file.write_text("strokes,pin,clearance_um,deviation_um\n2e6,J5,160,4\n")
     with pytest.raises(FileFormatError, match=r"measured.csv:2: pin: no pin 'J5'"):
         read_checks(file, machine.linkage)
+    file.write_text("strokes,pin,clearance_um,deviation_um\n2e6,J2,160,1e-300\n")
+    with pytest.raises(FileFormatError, match="deviation_um: expected 1e-06 to 1000 mm, got 1e-303 mm"):
+        read_checks(file, machine.linkage)
     file.write_text("strokes,commanded_x_mm,commanded_y_mm,x_mm,y_mm\n-1,0,-600,0,-600\n")
     with pytest.raises(FileFormatError, match="strokes: expected 0 or more, got -1"):
         read_checks(file, machine.linkage)
@@ -279,6 +282,7 @@ def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
         ({"alpha": 0.7}, "alpha: expected 0.001 to 0.5, got 0.7"),
         ({"least_interval": 1.0}, "least interval: expected at least 1/1000 of the horizon"),
         ({"limit": -1e-4}, "limit: expected more than 0"),
+        ({"horizon": 1e-308}, r"horizon: expected 1 to 1e\+15 strokes, got 1e-308 strokes"),
         ({"noise": 1e-3}, "noise: the mean of 5 readings is known worse than the limit; expected at most 224 um"),
         ({"change_at": 0.0}, "change at: expected a clearance above 0"),
     ],
@@ -293,7 +297,7 @@ def test_what_cannot_be_maintained(five_bar: Linkage) -> None:
     """Pins without clearance, and more poses than a check may have, are refused."""
     tight = five_bar.with_clearances(dict.fromkeys(five_bar.clearances, 0.0))
     path = named_path("pick-and-place")
-    with pytest.raises(InvalidValueError, match="wear needs them above 0"):
+    with pytest.raises(InvalidValueError, match="wear needs them at least 1e-06 mm"):
         maintained_linkage(tight, path, exposure=1e-6)
     with pytest.raises(InvalidValueError, match="poses: expected 1 to 6, got 9"):
         maintained_linkage(five_bar, path, exposure=1e-6, poses=9)

@@ -224,7 +224,8 @@ def test_table_of_measurements(tmp_path: Path) -> None:
     [
         ("1e6,J22,0.3,0.01", "did you mean 'J2'"),
         ("-1,J2,0.3,0.01", "expected 0 to 1e"),
-        ("1e6,J2,0.3,0", "expected a length above 0"),
+        ("1e6,J2,0.3,0", "expected 1e-06 to 1000 mm, got 0 mm"),
+        ("1e6,J2,0.3,1e-308", "expected 1e-06 to 1000 mm, got 1e-308 mm"),
         ("1e6,J2,1e9,0.1", "expected 0 to 1000 mm"),
         ("", "no rows"),
     ],

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, not_negative, number, of_shape, positive
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, in_range, not_negative, number, of_shape, positive
 from armwright.clearance.elastic_rod import Elasticity, Rod, RodBody, rod_of_body
 from armwright.errors import ArmwrightError, InvalidValueError, UnknownNameError, one_of
 
@@ -23,6 +23,8 @@ from armwright.errors import ArmwrightError, InvalidValueError, UnknownNameError
 GROUND = "ground"
 # Of the thesis [m/s²]; the standard's 9.80665 changes nothing to four digits.
 GRAVITY = (0.0, -9.81)
+# Radii of journals [mm].
+_RADII = (1e-3, 1e5)
 
 DriveKind: TypeAlias = Literal["effort", "motion"]
 
@@ -132,6 +134,7 @@ class ClearancePin:
         """Check the radii."""
         not_negative(self.clearance, f"pin {self.name}: clearance")
         positive(self.journal_radius, f"pin {self.name}: journal radius")
+        in_range(self.journal_radius * 1e3, _RADII, f"pin {self.name}: journal radius", "mm")
 
 
 @attrs.frozen(kw_only=True)

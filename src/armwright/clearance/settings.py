@@ -146,5 +146,5 @@ def _usual_slope(K: float) -> float:
 
 def _round_down(seconds: float) -> float:
     """Return a time with two digits that is not longer than another."""
-    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
+    unit = 10.0 ** (np.floor(np.log10(max(seconds, np.finfo(float).tiny))) - 1)
     return float(np.floor(seconds / unit) * unit)

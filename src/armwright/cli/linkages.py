@@ -29,6 +29,8 @@ FrictionVelocity: TypeAlias = Annotated[
     Literal["surface", "centre"],
     Option(help="Sliding velocity: of the surface, or of the journal's centre as in the thesis."),
 ]
+# The slowest drive of a linkage with one [rev/min], and the fastest, and most of its revolutions.
+_SLOWEST, _MOST = 1e-6, 1e9
 # Drives of the linkages to which an option applies.
 _DRIVES = {"--speed-rpm": 1, "--path": 2}
 # Places of a tip and of a slide [mm], and angles of a drive [deg].
@@ -147,10 +149,11 @@ def path_of(model: "Linkage", path: str | None, speed_rpm: float | None, revolut
     if path is not None:
         return named_path(path)
     assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
-    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
+    if not (_SLOWEST <= abs(speed_rpm) <= _MOST and 0 < revolutions <= _MOST):
         raise usage_error(
             "--speed-rpm",
-            f"expected a speed other than 0 and revolutions above 0, got {speed_rpm:g} and {revolutions:g}",
+            f"expected a speed of {_SLOWEST:g} to {_MOST:g} rev/min in either direction and revolutions above 0, up to "
+            f"{_MOST:g}, got {speed_rpm:g} and {revolutions:g}",
         )
     speed = speed_rpm * 2 * math.pi / 60
     start_angle = model.assembly.get(model.drives[0].body, 0.0)

@@ -32,6 +32,8 @@ _SCHEMA = Schema(
 TIP_MEASURES = ("AP", "RP")
 # Strokes of a life at most, and the largest length that is measured [m].
 MOST_STROKES, _LARGEST = 1e15, 1.0
+# Nobody measures better than to a nanometre [m].
+_FINEST = 1e-9
 
 
 class WearMeasurement(NamedTuple):
@@ -85,8 +87,10 @@ def read_wear_measurements(
             raise table.error(row, "strokes", f"expected 0 to {MOST_STROKES:g}, got {strokes:g}")
         if not 0 <= value <= _LARGEST:
             raise table.error(row, "value", f"expected 0 to {_LARGEST * 1e3:g} mm, got {value * 1e3:g} mm")
-        if not 0 < error <= _LARGEST:
-            raise table.error(row, "standard_error", f"expected a length above 0, got {error * 1e3:g} mm")
+        if not _FINEST <= error <= _LARGEST:
+            raise table.error(
+                row, "standard_error", f"expected {_FINEST * 1e3:g} to {_LARGEST * 1e3:g} mm, got {error * 1e3:g} mm"
+            )
         found.append(WearMeasurement(strokes, name, value, error))
     return tuple(found)
 

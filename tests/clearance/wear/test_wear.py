@@ -13,6 +13,7 @@ from armwright.clearance.scenario import prepare_scenario
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from armwright.clearance.static_equilibrium import find_static_equilibrium
+from armwright.clearance.wear.assessment import assess_wear
 from armwright.clearance.wear.contact_history import simulated_contact
 from armwright.clearance.wear.foundation import bin_angles, foundation_modulus, rest_positions
 from armwright.clearance.wear.life import WearLife, wear_life
@@ -227,10 +228,14 @@ def test_foundation_has_the_half_angle_it_is_asked_for() -> None:
 def test_what_cannot_wear() -> None:
     """Wear needs clearances, a coefficient above 0, and shares within 0 and 1."""
     bar = load_linkage("five-bar")
-    with pytest.raises(InvalidValueError, match="wear coefficient"):
+    with pytest.raises(InvalidValueError, match=r"wear coefficient: expected 1e-15 to 1e\+09 mm³/\(N m\), got 0 "):
         WearLaw(coefficient=0.0)
+    with pytest.raises(InvalidValueError, match=r"width: expected 0\.001 to 100000 mm, got 1e-305 mm"):
+        WearLaw(coefficient=1e-14, width=1e-308)
     with pytest.raises(InvalidValueError, match="bearing share: expected 0 to 1"):
         WearLaw(coefficient=1e-14, bearing_share=1.5)
+    with pytest.raises(InvalidValueError, match=r"spread of the wear coefficient: expected 0 to 5, got 1e\+06"):
+        assess_wear(bar, named_path("y1"), WearLaw(coefficient=1e-14), spread=1e6)
     tight = Stroke.of(bar.with_clearances({"J2": 0.0}), named_path("y1"), moments=5)
-    with pytest.raises(InvalidValueError, match="wear needs them above 0"):
+    with pytest.raises(InvalidValueError, match="wear needs them at least 1e-06 mm, got 0 mm"):
         wear_life(tight, WearLaw(coefficient=1e-14))

@@ -38,6 +38,8 @@ _SCHEMA = Schema(
         *(Column(name=name, quantity=LENGTH, group="lengths") for name in _CLEARANCES[2:]),
     )
 )
+# Lengths in a file, and their deviations [m]: nobody measures better than to a nanometre.
+_LARGEST, _FINEST = 1.0, 1e-9
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -137,10 +139,12 @@ def _clearance_check(table: UnitTable, linkage: Linkage, strokes: float, rows: l
         name = table.word("pin", row)
         if name not in names:
             raise table.error(row, "pin", str(UnknownNameError("pin", name, names)))
-        if not clearance >= 0:
-            raise table.error(row, "clearance", f"expected 0 or more, got {clearance * 1e3:g} mm")
-        if not deviation > 0:
-            raise table.error(row, "deviation", f"expected more than 0, got {deviation * 1e3:g} mm")
+        if not 0 <= clearance <= _LARGEST:
+            raise table.error(row, "clearance", f"expected 0 to {_LARGEST * 1e3:g} mm, got {clearance * 1e3:g} mm")
+        if not _FINEST <= deviation <= _LARGEST:
+            raise table.error(
+                row, "deviation", f"expected {_FINEST * 1e3:g} to {_LARGEST * 1e3:g} mm, got {deviation * 1e3:g} mm"
+            )
         pins.append(names.index(name))
     return ClearanceCheck(strokes=strokes, pins=tuple(pins), clearances=values[:, 0], deviations=values[:, 1])
 

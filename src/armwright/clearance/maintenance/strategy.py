@@ -15,7 +15,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, integer, not_negative, positive
+from armwright.arrays import Array, in_range, integer, not_negative, positive
 from armwright.clearance.maintenance.belief import Belief
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
 from armwright.errors import InvalidValueError
@@ -26,6 +26,7 @@ _DRIFT_SHARE = 0.2
 _COARSE, _FINE = 12, 8
 # Corrections in a horizon at most, and strokes at which the mean drift is computed.
 _MOST_CORRECTIONS, _DRIFT_POINTS = 500, 40
+_HORIZONS = (1.0, 1e15)
 _LEAST_ALPHA, _MOST_STOPS, _MOST_READINGS = 1e-3, 1000, 1000
 
 
@@ -54,7 +55,7 @@ class Strategy:
     def __attrs_post_init__(self) -> None:
         """Check the ranges."""
         positive(self.limit, "limit", "m")
-        positive(self.horizon, "horizon", "strokes")
+        in_range(self.horizon, _HORIZONS, "horizon", "strokes")
         positive(self.least_interval, "least interval", "strokes")
         positive(self.noise, "noise", "m")
         if integer(self.readings, "readings", least=1) > _MOST_READINGS:

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 from scipy.special import ndtri
 
-from armwright.arrays import Array, not_negative, positive
+from armwright.arrays import Array, in_range, positive
 from armwright.clearance.elastic_rod import refuse_rods
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path
@@ -34,6 +34,8 @@ _SAMPLE, _RUNS = 1e-5, 8
 # Quantiles of a normal deviate by name.
 QUANTILES: Mapping[str, float] = {f"{100 * part:g} %": float(ndtri(part)) for part in (0.05, 0.5, 0.95)}
 _DEPTHS = ("bearing_depth", "bearing_depth_error", "journal_depth", "journal_depth_error")
+# Standard deviation of the logarithm of a wear coefficient of which something is known.
+_WIDEST = 5.0
 # Bins whose depth is less than this part of the deepest are not worn.
 _WORN = 1e-3
 
@@ -293,7 +295,7 @@ def assess_wear(
         UnknownNameError: there is no such measure.
     """
     refuse_rods("wear", linkage.rods)
-    not_negative(spread, "spread of the wear coefficient")
+    in_range(spread, (0.0, _WIDEST), "spread of the wear coefficient")
     for name, limit in (limits or {}).items():
         positive(limit, f"limit of {one_of('measure', name, ('AP', 'RP', 'path'))}", "m")
     stroke, total = Stroke.of(linkage, path), 3 * steps

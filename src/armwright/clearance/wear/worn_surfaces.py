@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, integer, not_negative, positive
+from armwright.arrays import Array, in_range, integer, not_negative, number
 from armwright.clearance.lane_layout import Integers
 from armwright.clearance.linkage import Linkage, Material
 from armwright.clearance.wear.foundation import bin_angles, foundation_modulus, hertz_half_angle, layer_modulus
@@ -26,6 +26,10 @@ PRESSURES: tuple[Pressure, ...] = ("hertz", "winkler")
 FEWEST_BINS, MOST_BINS = 36, 3600
 # A contact narrower than two bins to each side is made as wide: no profile tells it.
 _NARROWEST = 2
+# A smaller clearance is none, and its walls have no direction in which they wear [m].
+_LEAST_CLEARANCE = 1e-9
+# Wear coefficients, to that of the growth by unit of it [mm³/(N m)]; widths and layers [mm].
+_COEFFICIENTS, _LENGTHS = (1e-15, 1e9), (1e-3, 1e5)
 # Depths beyond this part of the radius of a journal are no wear but a broken pin.
 BROKEN = 0.5
 
@@ -54,9 +58,9 @@ class WearLaw:
 
     def __attrs_post_init__(self) -> None:
         """Check names and ranges."""
-        positive(self.coefficient, "wear coefficient")
-        positive(self.width, "width", "m")
-        positive(self.layer, "layer", "m")
+        in_range(number(self.coefficient, "wear coefficient") * 1e9, _COEFFICIENTS, "wear coefficient", "mm³/(N m)")
+        in_range(number(self.width, "width") * 1e3, _LENGTHS, "width", "mm")
+        in_range(number(self.layer, "layer") * 1e3, _LENGTHS, "layer", "mm")
         one_of("pressure", self.pressure, PRESSURES)
         if not 0 <= not_negative(self.bearing_share, "bearing share") <= 1:
             raise InvalidValueError(f"bearing share: expected 0 to 1, got {self.bearing_share:g}")
@@ -136,13 +140,15 @@ def wearing_clearances(linkage: Linkage) -> Array:
     """Return (p,) the clearances of pins that can wear [m].
 
     Raises:
-        InvalidValueError: there are no pins, or a clearance is 0.
+        InvalidValueError: there are no pins, or a clearance is too small.
     """
     if not linkage.pins:
         raise InvalidValueError(f"{linkage.name} has no pins with clearance that could wear")
     c = linkage.clearance_array(None)
-    if not np.all(c > 0):
-        raise InvalidValueError(f"clearances: wear needs them above 0, got {c.min() * 1e3:g} mm")
+    if not np.all(c >= _LEAST_CLEARANCE):
+        raise InvalidValueError(
+            f"clearances: wear needs them at least {_LEAST_CLEARANCE * 1e3:g} mm, got {c.min() * 1e3:g} mm"
+        )
     return c
 
 
