@@ -52,6 +52,8 @@ def test_components_by_hand() -> None:
     assert life.hours == pytest.approx(1000 * 4 * 8 * 2 ** (-1 / 1.5))
     assert life.cycles_of(life.hours) == pytest.approx(life.hours * 3600 / 4)
     assert life.survival(life.hours) == pytest.approx(0.9)
+    # The joint holds its load in the pause too.
+    assert [one.load.rms_effort for one in life.components] == pytest.approx([50.0] * 2)
     assert life.components[0].exceeded == ("average",)
     assert life.work == pytest.approx(np.full(6, 50.0))
     assert "The motion exceeds ratings: reducer of joint 1 (average); bearing of joint 2 (average)" in life.notes[1]

@@ -76,6 +76,22 @@ def test_published_life() -> None:
     np.testing.assert_allclose(life.values(np.array([exact]))[1], limit, rtol=1e-3)
 
 
+@pytest.mark.parametrize("each", [False, True])
+def test_intervals_for_the_wear_coefficient(*, each: bool) -> None:
+    """Ends of the 90 % interval of a quantile are that quantile with the coefficient at its 95 and its 5 % quantile."""
+    linkage = wearing(1e-5, each=each)
+    worn = MEAN + np.array([5e-5, 0, 0])
+    limit = float(np.linalg.norm(linkage.random.errors(worn[None], np.zeros((1, 0)))))
+    life = LinkageLife.of(linkage, "error", limit, draw(linkage.size, samples=16_384))
+    # Only J2 wears, so that its coefficient is the one that counts.
+    z = np.random.default_rng(1).normal(size=(20_000, linkage.size))
+    z[:, 3:] = 0
+    strokes = linkage.lives("error", limit, z)
+    for part in (0.1, 0.5, 0.95):
+        expected = np.quantile(strokes, part) * np.exp(SPREAD * norm.ppf([0.05, 0.95]))
+        np.testing.assert_allclose(life.interval(part), expected, rtol=0.05)
+
+
 def test_measures_at_the_end_of_lives(rng: np.random.Generator) -> None:
     """Where a life ends the measure is its limit; before it no pose is beyond it."""
     linkage = wearing(2e-5, each=True, work=(0.14, 0.015, 0.09))

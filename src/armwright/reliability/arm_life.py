@@ -408,7 +408,9 @@ def assess_life(
     components = []
     for (joint, name), rating in stated.ratings.items():
         speed, effort = motion.qd[:, joint], motion.effort[:, joint]
-        load = load_of(motion.t, speed, effort, exponent=rating.exponent, dwell=motion.dwell)
+        # In the pause a joint holds what it held at the end, such as the weight of the arm.
+        held = float(effort[-1])
+        load = load_of(motion.t, speed, effort, exponent=rating.exponent, dwell=motion.dwell, held=held)
         hours = life_hours(rating, load)
         components.append(ComponentLife(joint=joint, name=name, rating=rating, load=load, hours=hours))
     components.sort(key=lambda one: one.hours)

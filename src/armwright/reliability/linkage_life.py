@@ -7,7 +7,7 @@ from functools import cached_property
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, Numbers, finite_or_none
+from armwright.arrays import Array, finite_or_none
 from armwright.reliability.linkage_wear import Measure, WearingLinkage
 from armwright.reliability.weighted_draws import WeightedDraws
 
@@ -54,9 +54,10 @@ class LinkageLife:
     def interval(self, part: float) -> tuple[float, float]:
         """Return the 90 % interval of a quantile of lives, where the wear coefficient is one number that is not known.
 
-        Its ends are the quantiles among linkages that wear fast, and among those that wear slowly.
+        Its ends are the quantiles among linkages whose wear coefficient is at its 95 and its 5 % quantile. Where every
+        pin has its own, these are the quantiles of what the coefficients together make of lives.
         """
-        found = sorted(float(rows.quantile(self.strokes[where], part)) for where, rows in self._tenths)
+        found = sorted(float(rows.quantile(strokes, part)) for strokes, rows in self._ends)
         return found[0], found[-1]
 
     def curve(self) -> tuple[Array, Array, Array]:
@@ -66,7 +67,7 @@ class LinkageLife:
         if not np.isfinite(end):
             end = float(finite.max()) if len(finite) else 1.0
         strokes = np.linspace(0.0, max(1.2 * end, 1.0), _CURVE)
-        band = [_cumulative(self.strokes[where], rows.weights, strokes) for where, rows in self._tenths]
+        band = [_cumulative(lives, rows.weights, strokes) for lives, rows in self._ends]
         ends = np.stack([np.min(band, axis=0), np.max(band, axis=0)])
         return strokes, _cumulative(self.strokes, self.draws.weights, strokes), ends
 
@@ -89,19 +90,31 @@ class LinkageLife:
         return np.asarray(weights @ parts / weights.sum())
 
     @cached_property
-    def _tenths(self) -> list[tuple[Numbers, WeightedDraws]]:
-        """Rows and draws of the tenths of linkages whose wear coefficients make the longest and the shortest lives."""
+    def _ends(self) -> list[tuple[Array, WeightedDraws]]:
+        """Lives and draws of linkages that wear as fast as the 95 % quantile of wear coefficients, and as the 5 % one.
+
+        They are those of the fastest and the slowest tenth, with wear coefficients moved to the middle of it: strokes
+        times wear coefficients decide what is worn.
+        """
         lived = np.isfinite(self.strokes) & (self.strokes > 0)
         if not self.wearing.spread or not lived.any():
-            return [(np.arange(len(self.strokes)), self.draws)]
-        numbers = self.draws.z[:, len(self.wearing.random.names) :]
-        design = np.concatenate([np.ones((len(numbers), 1)), numbers], axis=1)[lived]
-        weights = np.sqrt(self.draws.weights[lived])
-        slopes = np.linalg.lstsq(design * weights[:, None], np.log(self.strokes[lived]) * weights, rcond=None)[0]
-        order = np.argsort(numbers @ slopes[1:], kind="stable")
+            return [(self.strokes, self.draws)]
+        first = len(self.wearing.random.names)
+        numbers, slopes = self.draws.z[:, first:], np.array([-self.wearing.spread])
+        if self.wearing.each:
+            # Clearances count too: after measurements they and the wear coefficients depend on each other.
+            design = np.concatenate([np.ones((len(numbers), 1)), self.draws.z], axis=1)[lived]
+            weights = np.sqrt(self.draws.weights[lived])
+            found = np.linalg.lstsq(design * weights[:, None], np.log(self.strokes[lived]) * weights, rcond=None)[0]
+            slopes = found[1 + first :]
+        logs = numbers @ slopes
+        order = np.argsort(logs, kind="stable")
         total = np.cumsum(self.draws.weights[order])
-        fast, slow = order[total <= _TENTH], order[total > 1 - _TENTH]
-        return [(where, self.draws.among(where)) for where in (fast, slow)]
+        ends = []
+        for where in (order[total <= _TENTH], order[total > 1 - _TENTH]):
+            rows = self.draws.among(where)
+            ends.append((self.strokes[where] * np.exp(rows.quantile(logs[where], 0.5) - logs[where]), rows))
+        return ends
 
     def as_data(self) -> dict[str, object]:
         """Return the lives as plain data in SI units; what never ends is None."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, positive
+from armwright.arrays import Array, ArrayLike, floats, number, positive
 from armwright.errors import InvalidValueError, ShapeError
 
 # Exponents of the load in the law of life: balls, as in the wave generator of a strain wave gear, and rollers.
@@ -63,7 +63,13 @@ class Load(NamedTuple):
 
 
 def load_of(
-    time: ArrayLike, speed: ArrayLike, effort: ArrayLike, *, exponent: float = BALLS, dwell: float = 0.0
+    time: ArrayLike,
+    speed: ArrayLike,
+    effort: ArrayLike,
+    *,
+    exponent: float = BALLS,
+    dwell: float = 0.0,
+    held: float = 0.0,
 ) -> Load:
     """Return what a motion asks of the reducer of one joint.
 
@@ -73,6 +79,7 @@ def load_of(
         effort: (m,) of the joint [N m] or [N].
         exponent: of the load in the law of life.
         dwell: pause before the motion is repeated [s].
+        held: effort in it [N m] or [N].
 
     Raises:
         ShapeError: the arrays do not have one length, two samples at least.
@@ -91,7 +98,8 @@ def load_of(
     cycle = float(t[-1] - t[0]) + dwell
     way = _integral(v, t)
     mean = (_integral(v * f**exponent, t) / way) ** (1 / exponent) if way else 0.0
-    return Load(mean, way / cycle, float(f.max()), float(np.sqrt(_integral(f**2, t) / cycle)))
+    square = (_integral(f**2, t) + number(held, "held") ** 2 * dwell) / cycle
+    return Load(mean, way / cycle, float(f.max()), float(np.sqrt(square)))
 
 
 def life_hours(rating: Rating, load: Load) -> float:
