@@ -338,6 +338,7 @@ def test_every_file_is_read_in_one_place() -> None:
         "report/ros2_log.py",
         "export/",
         "clearance/exudyn/",
+        "clearance/mjcf/",
         "program/bytecode/verify.py",  # looks at titles that a program has in a text
         "report/markup.py",
         "program/diagnostics/index.py",

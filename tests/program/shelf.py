@@ -23,7 +23,7 @@ REJECTED = sorted((HERE / "rejected").rglob("*.rlo"))
 ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
 
 EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
-CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|joints|targets|moving) (.*)")
+CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|joints|targets|moving|flexible) (.*)")
 STRICT = re.compile(r"// strict$", re.MULTILINE)
 OLD = re.compile(r"// std=83$", re.MULTILINE)
 IMPORT = re.compile(r"// import: (\S+): (.*)")
@@ -50,6 +50,7 @@ def cell_of(text: str) -> KnownCell | None:
         joints=dict(one.split() for one in told.get("joints", ())),
         targets=dict(one.split(" of ") for one in told["targets"]) if "targets" in told else None,
         moving=frozenset(told["moving"]) if "moving" in told else None,
+        flexible=frozenset(told["flexible"]) if "flexible" in told else None,
         reach=float(told["reach"][0]) if "reach" in told else None,
     )
 

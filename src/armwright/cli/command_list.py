@@ -43,7 +43,7 @@ COMMANDS = {
     "vibration": "Print natural frequencies of an arm on the springs of its gears, and how far its tool yields.",
     "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
     "kernel": "Print the compiled kernel of a quantity for an arm, as LLVM IR, C, C++ or CUDA, and its operation count.",
-    "clearance": "Simulate, estimate, correct, wear and compare linkages with clearance in their revolute joints.",
+    "clearance": "Simulate, estimate, correct and compare linkages with clearance in their pins; how long they stay accurate.",
 }
 # Commands whose module has another name.
 _MODULES = {"jacobian": "forward"}
