@@ -24,7 +24,7 @@ from export.cases import EXAMPLES
 from export.random_programs import Writer
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.5)
+pytestmark = pytest.mark.part(0.35)
 
 CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",

@@ -46,6 +46,7 @@ def test_nothing_to_lay_out(text: str) -> None:
         around(text)
 
 
+@pytest.mark.share(0.04)
 def test_damaged_programs(sample: Sample) -> None:
     """Whatever is wrong in a program, laying out the rest changes no message of it, and twice is once."""
     laid = 0
