@@ -27,7 +27,7 @@ from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.arms import ARM_A, CENTRE
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.35)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
 
 # Twice the usual step, where no number of the thesis is compared.
 COARSE = attrs.evolve(CENTRE, step=2e-5)
@@ -307,7 +307,7 @@ def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
     assert correction.history[correction.best] < 0.3 * correction.history[0]
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("name", ["x4", "y9"])
 def test_mean_error_is_taken_away(name: str) -> None:
     """Where impacts begin at once, the mean error of other runs is no more than sixteen runs leave uncertain."""

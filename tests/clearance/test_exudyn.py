@@ -14,7 +14,7 @@ from clearance.arms import beginning
 from clearance.exudyn_five_bar import efforts_of, simulated
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 CLEARANCE = 5e-4
 END, EVERY = 0.15, 1e-3
@@ -34,7 +34,7 @@ def linkage(request: pytest.FixtureRequest) -> Linkage:
     return attrs.evolve(five_bar_linkage, material=attrs.evolve(five_bar_linkage.material, friction=request.param))
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_up_to_the_impacts(linkage: Linkage) -> None:
     """Both tips follow the same path until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")

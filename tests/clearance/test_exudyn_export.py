@@ -16,7 +16,7 @@ from armwright.errors import InvalidValueError
 from clearance.arms import beginning
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 # What two integrators with steps of 10 µs and two points of contact leave [m].
 NEAR = 1e-7
@@ -27,8 +27,8 @@ NEAR = 1e-7
     [
         # Past the jump of the torques at 0.05 s.
         ("five-bar", beginning(thesis_path("y1"), 0.06)),
-        pytest.param("slider-crank", constant_speed_path("turning", 0.0, 10.0, 0.02), marks=pytest.mark.drawn(0.5)),
-        pytest.param("four-bar", constant_speed_path("turning", np.pi / 3, 6.0, 0.02), marks=pytest.mark.drawn(0.5)),
+        pytest.param("slider-crank", constant_speed_path("turning", 0.0, 10.0, 0.02), marks=pytest.mark.drawn(0.34)),
+        pytest.param("four-bar", constant_speed_path("turning", np.pi / 3, 6.0, 0.02), marks=pytest.mark.drawn(0.34)),
     ],
     ids=["five-bar", "slider-crank", "four-bar"],
 )

@@ -53,7 +53,7 @@ def in_exudyn(task: Scenario, q: np.ndarray, *, elements: int, duration: float, 
     return simulated_elastic(arm, q, efforts_of(task), K, rod, duration=duration, step=step, every=EVERY)
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("path", ARMS)
 def test_at_rest_and_as_it_speeds_up(path: str) -> None:
     """The tip rests where Exudyn has it, and stays within a micrometre of it as it speeds up."""

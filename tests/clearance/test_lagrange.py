@@ -60,7 +60,7 @@ def test_without_contact(five_bar: Linkage) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.05])
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_in_contact(five_bar: Linkage, friction: float) -> None:
     """With journals on their walls and friction, both follow the same path too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)

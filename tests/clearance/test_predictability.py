@@ -12,7 +12,7 @@ from armwright.clearance.simulation import simulate
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 
 @pytest.mark.share(0.034)

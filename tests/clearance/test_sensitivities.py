@@ -200,7 +200,7 @@ LINKAGES = {
 }
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("name", LINKAGES)
 def test_differences_of_equilibria(name: str, sample: Sample) -> None:
     """Every column of random linkages, with rigid and with soft walls, is the slope of full equilibria."""

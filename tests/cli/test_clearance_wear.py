@@ -37,7 +37,7 @@ def test_wear_of_the_four_bar(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("five-bar", "--path", "y1", "--k", "0"), "wear coefficient: expected more than 0"),
+        (("five-bar", "--path", "y1", "--k", "0"), "wear coefficient: expected 1e-15 to 1e+09"),
         (("five-bar", "--k", "1e-5"), "expected either --path or --speed-rpm"),
         ((*SMALL, "--bearing-share", "2"), "bearing share: expected 0 to 1, got 2"),
     ],

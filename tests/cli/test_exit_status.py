@@ -16,7 +16,7 @@ from armwright.errors import ArmwrightError, ExitStatus, FileFormatError
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 PAGE = (Path(__file__).parents[2] / "docs" / "exit_status.md").read_text(encoding="utf-8")
 ALL_OWN = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, ArmwrightError)]
@@ -253,7 +253,7 @@ def test_changed_results_are_told(tmp_path: Path) -> None:
     ("arguments", "status"),
     [("fmt -", 1), ("fix -", 1), ("repl", 0), ("repl --json", 0), ("debug", 0), ("lsp", 0)],
 )
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_closed_input(arguments: str, status: int) -> None:
     """A closed standard input is an empty one."""
     command = f"{sys.executable} -m armwright {arguments} <&-"
@@ -265,7 +265,7 @@ def test_closed_input(arguments: str, status: int) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status"), [("show nosuch", 2), ("nosuch", 2), ("run", 2), ("check nosuch.rlo", 4), ("arms", 0)]
 )
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_full_error_output(arguments: str, status: int) -> None:
     """What the error output cannot take is lost, and the status stays."""
     command = f"{sys.executable} -m armwright {arguments} 2>/dev/full"

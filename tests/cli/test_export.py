@@ -9,7 +9,7 @@ from cli_calls import armwright
 from export.cases import CELLS, EXAMPLES
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 PALLETISE, UR5 = EXAMPLES / "palletise.rlo", CELLS["urscript"]
 SHORT = "BEGIN MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.05) END."
@@ -32,7 +32,7 @@ END.
         ("csv", "urscript", {"ARM_1.csv", "events.json"}),
     ],
 )
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_files_of_each_target(target: str, cell: str, files: set[str], tmp_path: Path) -> None:
     """The folder has the files of the target, their proof and the record of the command."""
     done = armwright("export", target, PALLETISE, "--cell", CELLS[cell], "--mode", "plan", "-o", tmp_path / "out")

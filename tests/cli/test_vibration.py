@@ -23,7 +23,7 @@ def test_of_one_configuration() -> None:
     assert np.linalg.norm(after["deflection_at_rest_m"]) > np.linalg.norm(before["deflection_at_rest_m"])
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("arm", ["puma560", "ur5"])
 def test_of_a_motion(arm: str, tmp_path: Path) -> None:
     """Arms of the catalogue with gears by option have a page with three figures along a motion."""

@@ -24,7 +24,7 @@ from export.cases import EXAMPLES
 from export.random_programs import Writer
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",
@@ -179,7 +179,7 @@ def test_the_file_as_it_is_has_no_fault(target: str) -> None:
 
 
 @pytest.mark.parametrize(("target", "old", "new"), [(target, *one) for target, ones in FAULTS.items() for one in ones])
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_planted_faults_are_found(target: str, old: str, new: str) -> None:
     """A loop that ends too soon, a tray 20 µm aside, a choice the other way round, a gripper that stays open."""
     text = main_text(target, SORTED[target])

@@ -142,7 +142,7 @@ def test_a_shoulder_ahead_of_its_axis_reaches_farther() -> None:
 
 
 @pytest.mark.parametrize("family", ["puma", "stanford", "parallel"])
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_nearest_pose_is_nearest_for_any_build(family: str) -> None:
     """No pose of that orientation which the arm reaches is nearer than the one said to be nearest; that is reached."""
     rng = np.random.default_rng(3)

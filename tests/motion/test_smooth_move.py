@@ -117,7 +117,7 @@ def test_residual_of_two_links() -> None:
     assert flat.time < 0.5
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("factor", [0.9, 1.1])
 def test_residual_at_other_frequencies(factor: float) -> None:
     """Where frequencies are 10 % off, ZVD leaves 8 % at most."""
@@ -160,7 +160,7 @@ def test_straight_line() -> None:
         smooth_move(arm, cartesian_move(arm, X, ends="running"), "zv", allowed=tolerance(1e-2))
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("smoothing", ["zv", "flat"])
 def test_limits_are_kept(smoothing: str) -> None:
     """Links and motors of a smooth move keep the limits of speed, acceleration and effort, weak motors too."""

@@ -18,7 +18,7 @@ from armwright.spatial.shapes import Box
 from oracles.benches import ARMS, HOLD, STOPPING_SPEEDS, TABLE, bench, compiled, without_pictures
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.35)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
 
 # Times of contact differ by this, beside the time in which an arm stops [s].
 LATER = 0.06
@@ -61,7 +61,7 @@ def both(cell: Cell, program: str) -> tuple[Recording, Recording, PhysicsCell]:
     return interpret(code, cell, kinematic_cell(cell)), interpret(code, cell, world), world
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("plane", [False, True])
 @pytest.mark.parametrize("arm", ["stanford", "puma560"])
 def test_as_without_physics(arm: str, sample: Sample, tmp_path: Path, *, plane: bool) -> None:

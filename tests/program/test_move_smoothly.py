@@ -59,7 +59,7 @@ def command(recording: Recording, number: int = -1) -> Trajectory:
     return recording.stages[number].motion
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("kind", ["zvd", "ei"])
 def test_two_links_come_to_rest(kind: str) -> None:
     """Of the vibration of two links after a MOVE little is left, simulated along what their motors do."""
@@ -169,7 +169,7 @@ def test_random_moves(sample: Sample) -> None:
     sample.record("moves", sample.count(60), 0, refused=refused)
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [

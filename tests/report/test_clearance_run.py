@@ -25,7 +25,7 @@ from armwright.report.clearance_run_page import animation_data, clearance_run_pa
 from armwright.report.five_bar_figure import scenario_workspace, workspace_figure
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 # The page writes five significant digits.
 FIVE_DIGITS = 0.5e-4
@@ -342,7 +342,7 @@ def test_opens_from_the_disk(opened: Opened) -> None:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("t", [0.0, 0.1, 0.2213, 0.25])
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_shows_the_moment(opened: Opened, run: ClearanceRun, t: float) -> None:
     """At every moment the page shows the error, the gaps and what flies as the simulation has it."""
     opened.seek(t)
@@ -408,7 +408,7 @@ def test_charts_lead(opened: Opened) -> None:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, ClearanceRun], name: str) -> None:
     """The pages of slider-crank and four-bar open, and end where their runs end."""
     shown = Opened(browser, written(tmp_path / f"{name}.html", cranked[name]))

@@ -95,7 +95,7 @@ def test_what_cannot_be_simulated() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_everything_at_once(seed: int) -> None:
     """Skew arms with friction, stops, a brake and a spring obey Newton's law, and both integrators see the same."""
     rng = np.random.default_rng(seed)

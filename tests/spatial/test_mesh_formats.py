@@ -125,7 +125,7 @@ def test_solids_of_known_form(ending: str, sample: Sample, tmp_path: Path) -> No
         ("torus", of_torus(0.05, 0.012)),
     ],
 )
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 def test_step(name: str, expected: tuple[float, np.ndarray]) -> None:
     """STEP is in the unit that it says, its faces are joined to a closed mesh, and round surfaces are near."""
     pytest.importorskip("cascadio")

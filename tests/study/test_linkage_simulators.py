@@ -8,7 +8,7 @@ from armwright.study import linkage_simulators
 from armwright.study.linkage_simulators import CHAOS, Comparison, LinkageSimulators
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("exudyn", [True, False], ids=["both", "MuJoCo alone"])
 def test_beside_other_simulators(exudyn: bool, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: FBT001 - a parameter
     """Others have the tip where ours has it; without Exudyn its rows are left out, and a note says so."""

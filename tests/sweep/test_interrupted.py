@@ -64,7 +64,7 @@ def blocks(out: Path) -> list[Path]:
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks Linux which processes are alive")
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("how", "workers"), [(signal.SIGKILL, 1), (signal.SIGKILL, 2), (signal.SIGTERM, 2), (signal.SIGINT, 2)]
 )

@@ -22,7 +22,7 @@ from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces, mean_g
 from armwright.errors import InvalidValueError
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.35)
+pytestmark = pytest.mark.part(0.2)
 
 RADIUS, CLEARANCE, FORCE, TURNS = 0.01, 2e-4, 25.0, 3
 # Of sums in double precision.
@@ -63,7 +63,7 @@ def worn(stroke: Stroke, *, steps: int = 5, max_step: float = 0.08, **law: objec
     return wear_life(stroke, WearLaw(coefficient=1e-13, bins=180, **law), steps=steps, max_step=max_step)  # type: ignore[arg-type]
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("pressure", ["hertz", "winkler"])
 @pytest.mark.parametrize("bins", [72, 180])
 def test_volume_of_a_steady_load(bushing: Stroke, pressure: str, bins: int) -> None:
@@ -159,7 +159,7 @@ def test_life_is_inverse_to_the_wear_coefficient(five_bar_life: WearLife) -> Non
     np.testing.assert_allclose(fast.surfaces[-1].bearing, first.surfaces[-1].bearing, atol=1e-12)
 
 
-@pytest.mark.drawn(0.5)
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize(
     ("path", "clearances", "friction", "works", "rotations"),
     [

@@ -28,7 +28,7 @@ def tokens(text: str) -> list[tuple[str, int, int]]:
     return [(one.key, one.start, one.end) for one in translate(Source("t.rlo", text)).tokens]
 
 
-@pytest.mark.drawn(0.34)
+@pytest.mark.drawn(0.12)
 @pytest.mark.parametrize("sign", SIGNS)
 @pytest.mark.parametrize("name", sorted(PROGRAMS))
 def test_one_sign_left_out(name: str, sign: str) -> None:
