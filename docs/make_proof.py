@@ -10,7 +10,7 @@ _HEAD = """# Random samples at full size
 `make proof` runs every random sample of the tests at its full size and writes this page. `make test` draws a tenth of
 each, or less where that takes minutes, anew in every run. A row is repeated with `ARMWRIGHT_SEED` set to its seed and
 `ARMWRIGHT_PROOF=out/proof`. Of tests that are run for many arms, programs or quantities (`pytest.mark.drawn`) `make
-test` draws a part anew in every run, too, which `--randomly-seed` repeats, and of the examples of Hypothesis a third;
+test` draws a part anew in every run, too, which `--randomly-seed` repeats, and of the examples of Hypothesis a fifth;
 `make proof` runs all of both.
 
 | what was tried | count | failures | figures | seed | test |

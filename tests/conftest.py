@@ -20,7 +20,7 @@ gc.set_threshold(50_000, 20, 50)
 gc.disable()  # while tests are collected; see pytest_collection_finish
 
 # No test depends on how fast a machine is.
-settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 33)
+settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 20)
 settings.load_profile("untimed")
 
 

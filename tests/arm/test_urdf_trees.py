@@ -18,7 +18,7 @@ from samples import Sample
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint as plain_joint, link, robot
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # Limits that have 0 among them, above them and below them, and where a joint rests in each.
 LIMITS = (((-2.0, 1.5), 0.0), ((0.5, 1.5), 1.0), ((-0.9, -0.1), -0.5))

@@ -20,7 +20,7 @@ from armwright.spatial.rotations import rotation_from_vector
 from calibration.boards import CHARUCO, photographed, random_lens
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 cv2 = pytest.importorskip("cv2")
 

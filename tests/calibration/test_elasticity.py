@@ -26,7 +26,7 @@ from calibration.simulated import LENGTH, configurations, random_arm, random_err
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 NOISE = 3e-5
 # Half of the readings are with this payload, off the axis of the last joint.

@@ -26,7 +26,7 @@ from calibration.simulated import random_arm, random_pose
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 cv2 = pytest.importorskip("cv2")
 

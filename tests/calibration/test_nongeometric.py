@@ -18,7 +18,7 @@ from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
 from calibration.simulated import configurations, random_arm, random_errors
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 NOISE = 3e-5
 # What joints give under the largest effort of gravity, and half the swing of gears [rad].

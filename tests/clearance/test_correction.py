@@ -27,7 +27,7 @@ from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.arms import ARM_A, CENTRE
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 # Twice the usual step, where no number of the thesis is compared.
 COARSE = attrs.evolve(CENTRE, step=2e-5)

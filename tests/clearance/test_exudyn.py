@@ -14,7 +14,7 @@ from clearance.arms import beginning
 from clearance.exudyn_five_bar import efforts_of, simulated
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CLEARANCE = 5e-4
 END, EVERY = 0.15, 1e-3

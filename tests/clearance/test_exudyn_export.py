@@ -16,7 +16,7 @@ from armwright.errors import InvalidValueError
 from clearance.arms import beginning
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # What two integrators with steps of 10 µs and two points of contact leave [m].
 NEAR = 1e-7

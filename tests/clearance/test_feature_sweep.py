@@ -26,7 +26,7 @@ from armwright.sweep.runner import run
 from armwright.sweep.task import Status, check_task, evaluate
 from clearance.arms import ARM_A, ARM_B, CENTRE, varied
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 RANGE = (0.1e-3, 0.5e-3)
 # So much friction in a pin no step can follow.

@@ -12,7 +12,7 @@ from armwright.clearance.simulation import simulate
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 
 @pytest.mark.share(0.034)

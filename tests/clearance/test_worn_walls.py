@@ -24,7 +24,7 @@ from armwright.clearance.worn_walls import WornWalls
 from clearance.mechanisms import GRAVITY, left_alone, still, thrown
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CLEARANCE, DEPTH = 5e-4, 2e-5
 ANGLES = np.arange(360) * (2 * np.pi / 360)

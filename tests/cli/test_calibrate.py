@@ -14,7 +14,7 @@ from armwright.report.elements import length_text
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 ARM = "puma560"
 

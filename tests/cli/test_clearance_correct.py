@@ -13,7 +13,7 @@ from cli_calls import armwright, check_mistake
 from five_bar_example import CENTRE, PLAY
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CLEARANCES = [part for name, c in PLAY.items() for part in ("--clearance", f"{name}={c * 1e3:g}")]
 ESTIMATE = {

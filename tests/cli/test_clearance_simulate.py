@@ -10,7 +10,7 @@ import pytest
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 FILES = {
     "report.html", "samples.csv", "summary.json", "path.svg", "bearings.svg", "error.svg", "spectrum.svg", "forces.svg",

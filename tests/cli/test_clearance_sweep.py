@@ -20,7 +20,7 @@ from five_bar_example import CENTRE, PATHS, assert_clearances_found
 pytest.importorskip("sklearn")
 pytest.importorskip("xarray")
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 # A run and another one a nanometre away tell until when a path is predictable.
 SWEEP = ("clearance", "sweep", "five-bar", *CENTRE, "--replicates", "1", "--workers", "1")

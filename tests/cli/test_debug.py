@@ -12,7 +12,7 @@ from armwright.cli.app import app
 from armwright.program.vm import excerpt
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"

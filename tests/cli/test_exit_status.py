@@ -16,7 +16,7 @@ from armwright.errors import ArmwrightError, ExitStatus, FileFormatError
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 PAGE = (Path(__file__).parents[2] / "docs" / "exit_status.md").read_text(encoding="utf-8")
 ALL_OWN = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, ArmwrightError)]

@@ -9,7 +9,7 @@ from cli_calls import armwright
 from export.cases import CELLS, EXAMPLES
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 PALLETISE, UR5 = EXAMPLES / "palletise.rlo", CELLS["urscript"]
 SHORT = "BEGIN MOVE ARM_1 TO ARM_1 * XYZ(0, 0, 0.05) END."

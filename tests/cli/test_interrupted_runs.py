@@ -22,7 +22,7 @@ from armwright.files.result_folder import PREFIX
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Whose results a folder holds.

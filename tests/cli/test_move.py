@@ -13,7 +13,7 @@ from armwright.motion import detour
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 POSES = EXAMPLES / "puma_poses.toml"

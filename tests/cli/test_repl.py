@@ -20,7 +20,7 @@ import pytest
 from cli_calls import armwright
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 ROOT = Path(__file__).parents[2]
 CELL = ROOT / "tests" / "program" / "corpus" / "cell1.json"

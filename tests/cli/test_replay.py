@@ -13,7 +13,7 @@ from cli_calls import armwright
 from files.logs_of_others import NAMES, json_log, mcap_file, motion
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RUN = (EXAMPLES / "stacking.rlo", "--cell", EXAMPLES / "stanford_cell.toml")

@@ -22,7 +22,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.files.output import stray_files
 from cli_calls import armwright, armwright_process
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"

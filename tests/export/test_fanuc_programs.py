@@ -13,7 +13,7 @@ from armwright.program import Source
 from export.cases import EXAMPLES
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CELL = read_cell(EXAMPLES / "lrmate_cell.toml")
 HEAD = """UNITS MM ;

@@ -24,7 +24,7 @@ from export.cases import EXAMPLES
 from export.random_programs import Writer
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CELLS = {
     "urscript": EXAMPLES / "ur5_cell.toml",

@@ -18,7 +18,7 @@ from armwright.identification.log import Log
 from identification.simulated import fourier, log, noise, truth
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 pytest.importorskip("clarabel", reason="the extra identification is not installed")
 

@@ -21,7 +21,7 @@ from oracles.arms import random_arm, random_configurations
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # Where the slope is regular the last step leaves nothing but rounding, of arms ten metres long [m] and [rad].
 RESIDUAL = 1e-12

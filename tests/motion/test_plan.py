@@ -21,7 +21,7 @@ from armwright.spatial.rotations import angle_between, rotation_from_vector
 from oracles.arms import random_configurations
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 DOWN = np.diag((1.0, -1.0, -1.0))
 POSE = 1e-9  # how well a knot is met, in m and rad

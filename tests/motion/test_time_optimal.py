@@ -30,7 +30,7 @@ from armwright.motion.xspline_path import xspline
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 PUMA = load_arm("puma560-seed")
 SPEED, ACCELERATION, EFFORT = PUMA.limits.speed, PUMA.limits.acceleration, PUMA.limits.effort

@@ -23,7 +23,7 @@ from armwright.spatial.rotations import rotation_from_vector
 from oracles.legs import beside_legs, turns_beside_legs
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 CORNER = 0.02
 # What a corner may miss in orientation for each metre that it may miss in position [rad/m].

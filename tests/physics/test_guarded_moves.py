@@ -18,7 +18,7 @@ from armwright.spatial.shapes import Box
 from oracles.benches import ARMS, HOLD, STOPPING_SPEEDS, TABLE, bench, compiled, without_pictures
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 # Times of contact differ by this, beside the time in which an arm stops [s].
 LATER = 0.06

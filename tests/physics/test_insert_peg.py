@@ -18,7 +18,7 @@ from armwright.physics.world import PhysicsCell
 from armwright.spatial.poses import homogeneous
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PROGRAM, CELL = EXAMPLES / "insert_peg.rlo", EXAMPLES / "socket_cell.toml"

@@ -26,7 +26,7 @@ from physics.cluttered import (
 )
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 ARMS = ("stanford", "puma560", "ur5")
 # Of so many checked configurations a search of OMPL may use ten times as many.

@@ -29,7 +29,7 @@ from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, without
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 STEP = 1e-3
 # What the law leaves out: the first touch of the pads, and creep.

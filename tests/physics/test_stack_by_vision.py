@@ -16,7 +16,7 @@ from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"

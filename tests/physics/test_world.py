@@ -25,7 +25,7 @@ from oracles.benches import ARMS, PROGRAM, bench, compiled, drawn_bench, flat_po
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # The block is found where the file says, without pictures.
 NO_CAMERA = (("width = 640\nheight = 480\nfovy_deg = 42\n", ""),)

@@ -28,7 +28,7 @@ from oracles.solids import coal_distance, coal_shape, random_shape
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 STIFFNESS = 2e4
 # A pin under the hand: half its height, and the half size of its top [m].

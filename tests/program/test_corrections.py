@@ -21,7 +21,7 @@ from program.running import check_going_back, check_ticks, failure, printed, too
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CELL = """

@@ -13,7 +13,7 @@ from program.running import cell_of, code_of, failure, printed, run
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 GCD = """FUNCTION gcd (a, b : SCALAR) : SCALAR ;
 BEGIN IF b = 0 THEN RETURN a ; RETURN gcd(b, MOD(a, b)) END ;

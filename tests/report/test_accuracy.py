@@ -15,7 +15,7 @@ from armwright.report.accuracy_figures import accuracy_drawings
 from armwright.report.accuracy_files import accuracy_files
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 NAME = r"P<1>&$\x$"
 

@@ -25,7 +25,7 @@ from armwright.report.clearance_run_page import animation_data, clearance_run_pa
 from armwright.report.five_bar_figure import scenario_workspace, workspace_figure
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # The page writes five significant digits.
 FIVE_DIGITS = 0.5e-4

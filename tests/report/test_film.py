@@ -14,7 +14,7 @@ from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.shapes import Box
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 pillow = pytest.importorskip("PIL.Image")
 pytest.importorskip("matplotlib")

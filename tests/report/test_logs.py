@@ -35,7 +35,7 @@ from armwright.spatial.shapes import Box, Capsule, Mesh
 from oracles.stocked_cell import stocked_run
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Positions are written to a nanometre, quaternions to 1e-12.

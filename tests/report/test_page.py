@@ -19,7 +19,7 @@ from armwright.report.stick_figure import arm_record
 from armwright.spatial.poses import homogeneous, to_noap
 from armwright.spatial.rotations import elementary_rotation
 
-pytestmark = [pytest.mark.part(0.2), pytest.mark.browser, pytest.mark.early]
+pytestmark = [pytest.mark.part(0.1), pytest.mark.browser, pytest.mark.early]
 
 # The page carries five significant digits.
 DIGITS = 1e-4

@@ -34,7 +34,7 @@ from armwright.spatial.shapes import Box, Mesh, Solid, Sphere, is_closed, volume
 from oracles.stocked_cell import stocked_run, torus, with_solids
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # The page carries five significant digits of joint positions, and six decimals of lengths.
 DIGITS = 2e-4

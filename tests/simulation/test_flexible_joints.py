@@ -21,7 +21,7 @@ from cli_calls import armwright
 from oracles.arms import coupled, random_arm
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 FILE = Path(__file__).parents[2] / "examples" / "two_link_springs.toml"
 TWO_LINKS = load_arm(str(FILE))

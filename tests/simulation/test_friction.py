@@ -20,7 +20,7 @@ from samples import Sample
 from simulation.machines import balanced, block, free, pendulum
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 MASS = 2.0
 FRICTION = {"coulomb_forward": 2.5, "coulomb_backward": 1.5, "stribeck": 1.2, "stribeck_speed": 0.05, "offset": -0.4}

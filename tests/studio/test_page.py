@@ -16,7 +16,7 @@ from armwright.studio.page import studio_page
 from armwright.studio.workbench import Workbench
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 pytest.importorskip("websockets")
 CELL = """\

@@ -13,7 +13,7 @@ from armwright.study.five_bar_clearance import EstimateRow, SweepResult
 
 pytest.importorskip("sklearn")
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 # Our path between the printed nodes is not the thesis' own; the first target, where the arm rests, is [mm].
 PRINTED = 5.1e-4

@@ -18,7 +18,7 @@ from armwright.sweep.worker import evaluate_pickled
 from sweep_tasks import Fall, calls_of
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 pytest.importorskip("xarray")
 dask = pytest.importorskip("dask")

@@ -22,7 +22,7 @@ from armwright.sweep.task import Axis, Output, Status
 from sweep_tasks import TIMES, Fall, calls_of
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 xr = pytest.importorskip("xarray")
 

@@ -19,7 +19,7 @@ from armwright.files.store import Store
 from fork_server import ForkServer, fork_server
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 SOURCES = str(Path(armwright.__file__).parents[1])
 VALUE = repr(math.sin(0.5) * 1.25)

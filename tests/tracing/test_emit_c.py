@@ -43,7 +43,7 @@ from oracles.compilers import (
 from samples import Sample
 from test_data_is_no_code import HOSTILE, random_name
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 FOR_DEVICE = "cuda as c++"
 LANGUAGES: dict[str, tuple[str, Language]] = {

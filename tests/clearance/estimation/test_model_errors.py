@@ -20,7 +20,7 @@ from cli_calls import armwright
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
 # Up to here a fault is small enough that its shift of the tip is proportional to it.

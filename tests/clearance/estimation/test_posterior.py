@@ -20,7 +20,7 @@ from clearance.arms import ARM_A, PATHS, accuracy, varied
 from clearance.conftest import FEATURES, RANGE, Swept
 from samples import Sample
 
-pytestmark = [pytest.mark.early, pytest.mark.part(0.2)]
+pytestmark = [pytest.mark.early, pytest.mark.part(0.1)]
 
 # Of walkers that remember some steps: of a standard deviation, and of a mean in standard deviations.
 SPREAD, MEAN = 0.12, 0.15

@@ -27,7 +27,7 @@ from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 from samples import Sample
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 # Mean of 50 readings with 10 µm each, and the measure that the thesis' way is held against [m, %].
 DWELL_NOISE = 10e-6 / np.sqrt(50)

@@ -18,7 +18,7 @@ from armwright.errors import InvalidValueError
 from clearance.arms import beginning
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 SMALL, RUBBING = np.array((0.252e-3, 0.099e-3, 0.1e-3)), 0.12
 # The steps of the tests that do not look at the first impacts alone [s].

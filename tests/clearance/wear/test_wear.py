@@ -22,7 +22,7 @@ from armwright.clearance.wear.worn_surfaces import WearLaw, WornSurfaces, mean_g
 from armwright.errors import InvalidValueError
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 RADIUS, CLEARANCE, FORCE, TURNS = 0.01, 2e-4, 25.0, 3
 # Of sums in double precision.

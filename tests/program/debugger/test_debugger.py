@@ -15,7 +15,7 @@ from armwright.program.vm.machine import Limits
 from program.running import cell_of, code_of, corpus_text, down
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"
 CALLS = (

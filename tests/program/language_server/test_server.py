@@ -24,7 +24,7 @@ from armwright.program.language_server.handlers import RloServer
 from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS
 
 # Slow: a half of its tests is drawn.
-pytestmark = pytest.mark.part(0.2)
+pytestmark = pytest.mark.part(0.1)
 
 CELL = """
 name = "bench"
