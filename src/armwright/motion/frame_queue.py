@@ -546,7 +546,8 @@ def _bounds_along(pieces: tuple[_Piece, ...]) -> tuple[Array, Array, Array]:
 
 def _least_around(edges: Array, values: Array, most: Array | None = None) -> Array:
     """Return of values (m,) on intervals the least one as far around each as the way may be while it is averaged."""
-    far = WINDOW * float((values if most is None else most).max())
-    first = np.searchsorted(edges[1:], edges[:-1] - far, side="right")
-    last = np.searchsorted(edges[:-1], edges[1:] + far, side="left")
+    # At the largest rates the way passes the edges at these times, and takes no less from one to another.
+    times = np.append(0.0, np.cumsum(np.diff(edges) / (values if most is None else most)))
+    first = np.searchsorted(times[1:], times[:-1] - WINDOW, side="right")
+    last = np.searchsorted(times[:-1], times[1:] + WINDOW, side="left")
     return np.array([values[i:j].min() for i, j in zip(first.tolist(), last.tolist(), strict=True)])
