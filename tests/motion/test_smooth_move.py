@@ -122,7 +122,7 @@ def test_flat_motors(rng: np.random.Generator) -> None:
 
 
 def test_positions_of_flat_motors() -> None:
-    """Where weight bends a gear on the way, its motor may not pass the limits of its joint, however slowly."""
+    """Motors swing within the limits of their joints, by a slower motion where inertia bends the gear, not weight."""
     limits = attrs.evolve(TWO_LINKS.joints[1].limits, upper=0.301)
     limited = attrs.evolve(TWO_LINKS, joints=[TWO_LINKS.joints[0], attrs.evolve(TWO_LINKS.joints[1], limits=limits)])
     ends = [links_at_rest(limited, theta) for theta in ((-1.0, 0.3), (1.0, 0.3))]
@@ -130,6 +130,13 @@ def test_positions_of_flat_motors() -> None:
 
     with pytest.raises(IncapableArmError, match=r"gears yield on the way, and the motor of joint 2 would be at"):
         fast.slowing(limited)
+
+    lying = attrs.evolve(limited, gravity=np.zeros(3))
+    fast = flat_motion(lying, ninth(*np.array(((-1.0, 0.3), (1.0, 0.3))), 0.8))
+    factor, _limit = fast.slowing(lying)
+    slow = flat_motion(lying, fast.links.slowed(factor * 1.001))
+    assert fast.motors.extremes()[1][1] > 0.301 > slow.motors.extremes()[1][1]
+    assert slow.slowing(lying)[0] == 1
 
 
 def zvd() -> Shaper:

@@ -11,8 +11,7 @@ from armwright.arm.load import load_arm
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.reader import parse_cell
 from armwright.cell.simulator import Simulator
-from armwright.dynamics import modes, with_gears
-from armwright.dynamics.flexible_joints import links_at_rest
+from armwright.dynamics import links_at_rest, modes, with_gears
 from armwright.errors import FileFormatError
 from armwright.kinematics import forward
 from armwright.motion import Trajectory, ninth, settling

@@ -33,9 +33,9 @@ _NINTH = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 126.0, -420.0, 540.0, -315.0, 70.0))
 _PIECES, _LOOKS = 200, 4
 # Part of the limits of effort that is used at most at samples, so that they hold between them too.
 _USED = 0.9999
-# Motors are known so well at least [rad], [m].
+# How far motors may be from what would move the links exactly [rad], [m].
 _ERROR = 1e-4
-# A joint that were to move so many times slower, for a limit of its position, stands at that limit.
+# A motor that would have to move so many times slower not to swing beyond a limit stands at it; the least slowing.
 _NEVER, _SLOWER = 10.0, 1e-3
 
 
@@ -95,7 +95,7 @@ class FlatMotion(NamedTuple):
         return factor, ("effort", joint)
 
     def _slowing_for_positions(self, arm: Arm) -> float:
-        """Return how many times slower the motors must run not to swing beyond their limits on the way."""
+        """Return how many times slower the motors must run not to swing beyond the limits of positions."""
         violated = [each for some in self.motors.extremes() for each in violations_of(arm, some.tolist())]
         if not violated:
             return 1.0
