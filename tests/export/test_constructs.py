@@ -109,7 +109,7 @@ encoders = {{ counts = [1e6, 1e6, 1e6, 1e6, 1e6, 1e6] }}
     dimmer = '\nHORN = {}\nDIMMER = { analogue = true, output = 5, signal = "aoDimmer" }'
     text = text.replace("[devices]", f"{second}\n[devices]{dimmer}")
     text = text.replace("[inputs]", "[inputs]\nDOOR = {}") if "[inputs]" in text else f"{text}\n[inputs]\nDOOR = {{}}\n"
-    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, 0, 0, 0]\n"
+    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, inf, inf, inf]\n"
     return text.replace("[visions]", "[visions]\nC = [[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.42,-0.10, 0.20]]")
 
 

@@ -86,7 +86,7 @@ def cell(target: str, folder: Path) -> Cell:
     belt = (
         "[frames.BELT]\nat = [1,0,0, 0,1,0, 0,0,1, 0.4,0,0.1]\nmoves = { speed_mm_per_s = 10, window_mm = [-500, 500] }"
     )
-    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, 0, 0, 0]\n"
+    text += "\n[arms.ARM_1.smooth]\nstiffness_Nm_per_rad = [6e4, 6e4, 4e4, inf, inf, inf]\n"
     seen = "C = [[1,0,0, 0,-1,0, 0,0,-1, 0.40,0.06,0.16]]"
     path.write_text(text.replace("[visions]", f"{belt}\n\n[visions]\n{seen}"), "utf-8")
     return read_cell(path)

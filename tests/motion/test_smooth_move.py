@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import planning_arm
-from armwright.dynamics.flexible_joints import modes, with_gears
+from armwright.dynamics.flexible_joints import deflection, gear_efforts, links_at_rest, modes, with_gears
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.deviation import distance_from_line
@@ -96,7 +96,47 @@ def test_flat_links() -> None:
     found = simulate_flexible(TWO_LINKS, START, duration=0.5, motors=flat.motors, period=0.05)
 
     np.testing.assert_allclose(found.q, flat.links(found.t), atol=5e-6)
-    np.testing.assert_allclose(found.tau[1:-1], flat.efforts[20:-1:20], atol=0.1)
+    np.testing.assert_allclose(found.tau[1:-1], flat.efforts[80:-1:80], atol=0.1)
+
+
+def test_flat_motors(rng: np.random.Generator) -> None:
+    """Motors are as near to their formula as is said, begin and end at rest, and stay with links on rigid gears."""
+    damped = with_gears(TWO_LINKS, [6000.0, np.inf], [3.0, 1.0])
+    for arm in (TWO_LINKS, damped):
+        flat = flat_motion(arm, ninth(START, GOAL, 0.4))
+        t, h = rng.uniform(0.01, 0.39, 200), 1e-5
+        tau, before, after = (gear_efforts(arm, *(flat.links(t + x, order) for order in range(3))) for x in (0, -h, h))
+        K, D = arm.motor_values("stiffness"), arm.motor_values("damping")
+        exact = flat.links(t) + (tau - D / K * (after - before) / (2 * h)) / K
+
+        assert (np.abs(flat.motors(t) - exact) <= flat.error + 1e-10).all()
+        assert flat.error.max() < 3e-5
+        ends = np.array((0.0, 0.4))
+        np.testing.assert_allclose(flat.motors(ends), (START, GOAL) - deflection(arm, (START, GOAL)), atol=1e-12)
+        assert max(np.abs(flat.motors(ends, order)).max() for order in (1, 2)) < 1e-7
+        for order in (0, 1, 2):
+            inside = flat.motors.times[1:-1]
+            np.testing.assert_allclose(flat.motors(inside - 1e-12, order), flat.motors(inside, order), atol=1e-6)
+        np.testing.assert_allclose(links_at_rest(arm, flat.motors(0.4)), GOAL, atol=1e-12)
+    assert not np.abs(flat.motors(t) - flat.links(t))[:, 1].max() > 1e-12
+
+
+def test_positions_of_flat_motors() -> None:
+    """Motors swing within the limits of their joints, by a slower motion where inertia bends the gear, not weight."""
+    limits = attrs.evolve(TWO_LINKS.joints[1].limits, upper=0.301)
+    limited = attrs.evolve(TWO_LINKS, joints=[TWO_LINKS.joints[0], attrs.evolve(TWO_LINKS.joints[1], limits=limits)])
+    ends = [links_at_rest(limited, theta) for theta in ((-1.0, 0.3), (1.0, 0.3))]
+    fast = flat_motion(limited, ninth(*ends, 0.6))
+
+    with pytest.raises(IncapableArmError, match=r"gears yield on the way, and the motor of joint 2 would be at"):
+        fast.slowing(limited)
+
+    lying = attrs.evolve(limited, gravity=np.zeros(3))
+    fast = flat_motion(lying, ninth(*np.array(((-1.0, 0.3), (1.0, 0.3))), 0.8))
+    factor, _limit = fast.slowing(lying)
+    slow = flat_motion(lying, fast.links.slowed(factor * 1.001))
+    assert fast.motors.extremes()[1][1] > 0.301 > slow.motors.extremes()[1][1]
+    assert slow.slowing(lying)[0] == 1
 
 
 def zvd() -> Shaper:

@@ -23,7 +23,9 @@ REJECTED = sorted((HERE / "rejected").rglob("*.rlo"))
 ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
 
 EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
-CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|joints|targets|moving|flexible) (.*)")
+CELL = re.compile(
+    r"// cell: (arms|frames|devices|visions|reach|inputs|analogue|joints|targets|moving|flexible|flat) (.*)"
+)
 STRICT = re.compile(r"// strict$", re.MULTILINE)
 OLD = re.compile(r"// std=83$", re.MULTILINE)
 IMPORT = re.compile(r"// import: (\S+): (.*)")
@@ -51,6 +53,7 @@ def cell_of(text: str) -> KnownCell | None:
         targets=dict(one.split(" of ") for one in told["targets"]) if "targets" in told else None,
         moving=frozenset(told["moving"]) if "moving" in told else None,
         flexible=frozenset(told["flexible"]) if "flexible" in told else None,
+        flat=frozenset(told.get("flat", ())),
         reach=float(told["reach"][0]) if "reach" in told else None,
     )
 

@@ -12,8 +12,9 @@ from armwright.arrays import Array
 from armwright.cell.loads import loaded_arm
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
-from armwright.dynamics import inverse_dynamics, with_gears
+from armwright.dynamics import deflection, inverse_dynamics, links_at_rest, with_gears
 from armwright.kinematics import forward, jacobian, jacobian_rate
+from armwright.motion import ModeShaping, ninth
 from armwright.program import Source, run
 from armwright.program.vm.interpreter import motion_warnings
 from armwright.program.vm.recording import Recording
@@ -149,3 +150,20 @@ def test_frequencies_of_a_loaded_arm() -> None:
         slowest.append(shaping.frequencies)
 
     assert (slowest[0] < 0.95 * slowest[1]).all()
+
+
+def test_flat_feedforward_of_a_loaded_arm() -> None:
+    """A MOVE SMOOTHLY by flat feedforward has the weight and the inertia of the part in the hand."""
+    cell = cell_of_parts()
+    placed = cell.arms["ARM_1"]
+    arm = with_gears(placed.arm, [2e4, 2e4, *[np.inf] * 4])
+    springs = attrs.evolve(placed, arm=arm, smooth=ModeShaping(kind="flat"))
+    recording = ran("MOVE weight TO above SMOOTHLY ;", attrs.evolve(cell, arms={"ARM_1": springs}))
+    motors, X_HP = recording.stages[-1].motion, recording.observations.parts["WEIGHT"].poses[-1]
+    loaded = loaded_arm(recording.cell, "ARM_1", [("WEIGHT", X_HP)])
+    start, end = (links_at_rest(loaded, motors(t)) for t in (0.0, motors.duration))
+    links, t = ninth(start, end, motors.duration), np.linspace(0, motors.duration, 50)
+    states = [links(t, order) for order in range(3)]
+
+    np.testing.assert_allclose(motors(t), states[0] - deflection(loaded, *states), atol=1e-9)
+    assert np.abs(motors(t) - states[0] + deflection(arm, *states)).max() > 1e-4

@@ -10,10 +10,11 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.reader import parse_cell
-from armwright.dynamics import modes, with_gears
+from armwright.cell.simulator import Simulator
+from armwright.dynamics import links_at_rest, modes, with_gears
 from armwright.errors import FileFormatError
 from armwright.kinematics import forward
-from armwright.motion import Trajectory, settling
+from armwright.motion import Trajectory, ninth, settling
 from armwright.motion.mode_shaping import ModeShaping
 from armwright.program import Source
 from armwright.program.formatter.format import formatted
@@ -22,10 +23,13 @@ from armwright.program.language_server.analysis import Settings, analyse
 from armwright.program.language_server.cell_lookup import CellCache
 from armwright.program.language_server.completions import completions
 from armwright.program.language_server.hover import hover
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Recording
 from armwright.report.run_files import summary_data
 from armwright.report.run_summary import RunSummary
-from program.running import check_going_back, check_ticks, failure, printed, run, tool_positions
+from armwright.simulation import Adaptive, simulate_flexible
+from program.running import check_going_back, check_ticks, code_of, failure, printed, run, tool_positions
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -35,7 +39,7 @@ CELL = """
 model = "ur5"
 hand = [1, 0, 0,  0,-1, 0,  0, 0,-1,   0.40, 0.00, 0.25]
 [arms.ARM_1.smooth]
-stiffness_Nm_per_rad = [{stiffness}, 0, 0, 0]
+stiffness_Nm_per_rad = [{stiffness}, inf, inf, inf]
 damping_Nms = [5, 5, 5, 0, 0, 0]
 """
 DECLARED = "UNITS MM ; VAR f, g : FRAME ; n : SCALAR ; BEGIN f = ARM_1 ; g = f * XYZ(0, -150, 50) ; n = 0 ;"
@@ -47,6 +51,7 @@ def cell(stiffness: str = "8000, 8000, 5000", more: str = "") -> Cell:
 
 
 SPRINGS = cell()
+FLAT = cell(more='shaper = "flat"')
 
 
 def ran(text: str, where: Cell = SPRINGS) -> Recording:
@@ -60,7 +65,7 @@ def command(recording: Recording, number: int = -1) -> Trajectory:
 
 
 @pytest.mark.drawn(0.34)
-@pytest.mark.parametrize("kind", ["zvd", "ei"])
+@pytest.mark.parametrize("kind", ["zvd", "ei", "flat"])
 def test_two_links_come_to_rest(kind: str) -> None:
     """Of the vibration of two links after a MOVE little is left, simulated along what their motors do."""
     placed = CellArm(arm=TWO_LINKS, start=(0.2, 0.3), smooth=ModeShaping(kind=kind, tolerance=0.01))
@@ -73,6 +78,74 @@ def test_two_links_come_to_rest(kind: str) -> None:
     assert plain > 5e-3
     assert settling(TWO_LINKS, command(smooth)).residual < 0.01 * plain
     np.testing.assert_allclose(command(smooth)(command(smooth).duration), (1.0, 1.2), atol=1e-12)
+
+
+def test_flat_feedforward() -> None:
+    """Motors begin and end where a program says, links follow, and the simulated efforts of weak motors keep limits."""
+    joints = [
+        attrs.evolve(joint, limits=attrs.evolve(joint.limits, effort=effort))
+        for joint, effort in zip(TWO_LINKS.joints, (150, 45), strict=True)
+    ]
+    weak = attrs.evolve(TWO_LINKS, joints=joints)
+    recordings = []
+    for arm in (TWO_LINKS, weak):
+        placed = CellArm(arm=arm, start=(0.2, 0.3), smooth=ModeShaping(kind="flat"))
+        where = Cell(name="two links", arms={"ARM_1": placed}, gravity=(0, -9.81, 0))
+        recordings.append(run("BEGIN MOVE ARM_1 TO JOINTS(1rad, 1.2rad) SMOOTHLY, WITH SPEED = 120 ; END.", where))
+    motors = command(recordings[1])
+    ends = np.array((0.0, motors.duration))
+    start, goal = (links_at_rest(weak, motors(t)) for t in ends)
+    by = Adaptive(rtol=1e-7, atol=1e-9)
+    found = simulate_flexible(weak, start, duration=motors.duration, motors=motors, integrator=by, period=5e-3)
+
+    check_ticks(recordings[1])
+    assert motors.duration > command(recordings[0]).duration
+    np.testing.assert_allclose(motors(ends), ((0.2, 0.3), (1.0, 1.2)), atol=1e-12)
+    assert max(np.abs(motors(ends, order)).max() for order in (1, 2)) < 1e-7
+    np.testing.assert_allclose(found.q, ninth(start, goal, motors.duration)(found.t), atol=1e-5)
+    assert (np.abs(found.tau).max(axis=0) <= weak.limits.effort).all()
+    assert (np.abs(found.tau).max(axis=0) > 0.98 * weak.limits.effort).any()
+    shaping = recordings[1].stages[0].stage.shaping
+    assert shaping is not None
+    assert not len(shaping.frequencies)
+    assert shaping.deviation > 0
+    notes = " ".join(RunSummary(recording=recordings[1], diagnostics=(), hint="").notes)
+    assert "flat feedforward: +0." in notes
+    assert "limited by the effort of joint" in notes
+
+
+@pytest.mark.drawn(0.34)
+def test_flat_feedforward_of_six_joints() -> None:
+    """Of the vibration of a UR5 on springs a hundredth is left at most."""
+    arm = SPRINGS.arms["ARM_1"].arm
+    plain, smooth = (command(ran(f"MOVE ARM_1 TO g {word} WITH SPEED = 120 ;", FLAT)) for word in ("", "SMOOTHLY,"))
+
+    assert settling(arm, smooth).residual < 0.01 * settling(arm, plain).residual
+
+
+def test_stops_of_flat_feedforward() -> None:
+    """Guards, BRAKE and RESUME stop the motors on their path, and let them go on to the goal."""
+    motion = "MOVE ARM_1 TO g SMOOTHLY, WITH SPEED = 40"
+    interrupt = "WHEN w : TIME > 0.6 DO BEGIN BRAKE ; PAUSE 0.1 ; RESUME END"
+    halted = ran(f"{motion}, ON Y(ARM_1) > 60 DO HALT ; PRINT(Y(ARM_1)) ;", FLAT)
+    braked = ran(f"{interrupt} ; {motion} ; PRINT(DIST(ARM_1, g)) ;", FLAT)
+
+    for recording in (halted, braked):
+        check_ticks(recording)
+    assert 60 < float(printed(halted)[0]) < 149
+    assert float(printed(braked)[0]) < 1e-6
+    assert [stage.stage.shaping is None for stage in braked.stages] == [False, True]
+
+
+def test_flat_feedforward_of_lines() -> None:
+    """Straight lines are refused before the arm moves, by the compiler where it knows the cell."""
+    for way in ("STRAIGHTLY, SMOOTHLY", "SMOOTHLY, WITH DEPARTURE = f * XYZ(0, 0, -20)"):
+        text = f"{DECLARED} MOVE ARM_1 TO g {way} ; END."
+        with pytest.raises(AssertionError, match=r"E258.*motions of the joints and no straight line"):
+            run(text, FLAT)
+        with pytest.raises(RunError, match="motions of the joints and no straight line") as error:
+            interpret(code_of(text, SPRINGS), FLAT, Simulator(FLAT))
+        assert error.value.diagnostic.code == "E258"
 
 
 def test_path_of_the_joints() -> None:
@@ -140,9 +213,10 @@ def test_random_moves(sample: Sample) -> None:
     refused = 0
     for random in sample.cases(60):
         stiffness = ", ".join(f"{x:.0f}" for x in 10 ** random.uniform(3, 5, 3))
-        shaper = random.choice(["zv", "zvd", "ei"])
+        shaper = random.choice(["zv", "zvd", "ei", "flat"])
         where = cell(stiffness, f'shaper = "{shaper}"\nmodes = {random.integers(1, 4)}\n')
-        way = random.choice(["", "STRAIGHTLY,", "WITH APPROACH = g * XYZ(0, 0, -40),"])
+        ways = ["", "STRAIGHTLY,", "WITH APPROACH = g * XYZ(0, 0, -40),"]
+        way = "" if shaper == "flat" else random.choice(ways)
         v = random.uniform(50, 600)
         how = ["WITH SPEED = 120", f"WITH VELOCITY = {v:.3f}", "WITH DURATION = 4", "WITH ROTATION = 40deg"]
         clause = how[random.integers(4)]
@@ -238,7 +312,7 @@ def test_going_back() -> None:
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ('shaper = "zdv"', "expected one of ei, zv, zvd, got the text 'zdv'; did you mean 'zv'"),
+        ('shaper = "zdv"', "expected one of ei, flat, zv, zvd, got the text 'zdv'; did you mean 'zv'"),
         ("modes = 9", "modes"),
         ("tolerance = 0.9", "tolerance"),
         ("modus = 2", "modus"),
@@ -248,8 +322,9 @@ def test_wrong_keys(line: str, says: str) -> None:
     """A key that is unknown or out of range is refused with its line."""
     with pytest.raises(FileFormatError, match=says):
         cell(more=line)
-    with pytest.raises(FileFormatError, match="0 for a rigid gear, got -5"):
-        cell("1e4, -5, 0")
+    for value in (-5, 0):
+        with pytest.raises(FileFormatError, match=f"0.001 to 1e\\+12, or inf for a rigid gear, got {value}"):
+            cell(f"1e4, {value}, 0")
     with pytest.raises(FileFormatError, match="6 numbers"):
         cell("1e4")
 

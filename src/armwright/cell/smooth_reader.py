@@ -10,10 +10,9 @@ from armwright.arm.drive import STIFFNESS
 from armwright.arm.model import Arm
 from armwright.dynamics.flexible_joints import with_gears
 from armwright.files.document import Table
-from armwright.motion.mode_shaping import ModeShaping
-from armwright.motion.shaping import ShaperKind
+from armwright.motion.mode_shaping import ModeShaping, Smoothing
 
-_KINDS: dict[str, ShaperKind] = {kind: kind for kind in get_args(ShaperKind)}
+_KINDS: dict[str, Smoothing] = {kind: kind for kind in get_args(Smoothing)}
 # Of more modes a shaper would take longer than most moves.
 _MODES = 6
 _TOLERANCE = (1e-3, 0.5)
@@ -38,11 +37,10 @@ def with_read_gears(arm: Arm, entry: Table) -> Arm:
         return arm
     values = {}
     for name, key in keys.items():
-        values[name] = entry.vector(key, arm.n) if key in entry else arm.motor_values(name)
-        lower = STIFFNESS[0] if name == "stiffness" else 0.0
+        stiff = name == "stiffness"
+        values[name] = entry.vector(key, arm.n, infinite=stiff) if key in entry else arm.motor_values(name)
+        lower, rigid = (STIFFNESS[0], ", or inf for a rigid gear") if stiff else (0.0, "")
         for i, value in enumerate(values[name].tolist() if key in entry else ()):
-            if not (value == 0 or lower <= value <= STIFFNESS[1]):
-                rigid = ", or 0 for a rigid gear" if name == "stiffness" else ""
+            if not (lower <= value <= STIFFNESS[1] or (stiff and value == np.inf)):
                 raise entry.error(key, f"expected {lower:g} to {STIFFNESS[1]:g}{rigid}, got {value:g}", i)
-    stiffness = np.where(values["stiffness"] == 0, np.inf, values["stiffness"])
-    return with_gears(arm, stiffness, values["damping"])
+    return with_gears(arm, values["stiffness"], values["damping"])

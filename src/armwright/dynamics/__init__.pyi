@@ -12,6 +12,7 @@ from .flexible_joints import (
     Modes as Modes,
     deflection as deflection,
     gear_efforts as gear_efforts,
+    links_at_rest as links_at_rest,
     modes as modes,
     tool_compliance as tool_compliance,
     with_gears as with_gears,

@@ -16,16 +16,20 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import known_arm
+from armwright.arm.positions import known_arm, single_configuration
 from armwright.arrays import LARGEST, Array, ArrayLike, Flags, one_or_each
 from armwright.dynamics.accelerations import without_drives
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import IncapableArmError, InvalidValueError, UnsupportedArmError
 from armwright.kinematics.jacobians import jacobian
 
 _HERTZ = 1 / (2 * np.pi)
+# No gear that carries an arm is deflected farther by its weight [rad], [m].
+_SOFT = 1.0
+# Where the links stand is found to this, in at most so many rounds [rad], [m].
+_FOUND, _ROUNDS = 1e-13, 100
 
 
 class Modes(NamedTuple):
@@ -182,6 +186,29 @@ def deflection(
     still = np.zeros_like(np.asarray(q, dtype=np.float64))
     tau = gear_efforts(arm, q, still if qd is None else qd, still if qdd is None else qdd, wrench)
     return np.asarray(-tau / arm.motor_values("stiffness"))
+
+
+def links_at_rest(arm: Arm, theta: ArrayLike) -> Array:
+    """Return where the links stand on their gears when the motors stand: theta = q + K⁻¹ g(q).
+
+    Args:
+        arm: with n joints.
+        theta: (n,) positions of the motors [rad] or [m].
+
+    Raises:
+        UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
+        IncapableArmError: the gears do not carry the weight.
+    """
+    theta = q = single_configuration(arm, theta)
+    for _ in range(_ROUNDS):
+        q, last = theta + deflection(arm, q), q
+        if np.abs(q - last).max() < _FOUND * max(1.0, np.abs(q).max()):
+            return q
+        if np.abs(q - theta).max() > _SOFT:
+            break
+    raise IncapableArmError(
+        f"arm '{arm.name}': its gears are so soft that its weight bends them without end; check their stiffness"
+    )
 
 
 def joint_stiffness(arm: Arm) -> Array:

@@ -151,14 +151,18 @@ class Table:
             raise self.error(key, f"expected true or false, got {_value_text(value)}")
         return value
 
-    def vector(self, key: str, length: int | Collection[int], default: Any = _MISSING) -> Array:
-        """Return an array of that many finite numbers; several lengths may be allowed.
+    def vector(
+        self, key: str, length: int | Collection[int], default: Any = _MISSING, *, infinite: bool = False
+    ) -> Array:
+        """Return an array of that many finite numbers; several lengths may be allowed, and ``inf``.
 
         Raises:
             FileFormatError: it is missing without a default, or not such an array.
         """
         value = self._value(key, default, f"a list of {_numbers_text(length)}")
-        return np.asarray(default, dtype=np.float64) if value is default else self._numbers((key,), value, length)
+        if value is default:
+            return np.asarray(default, dtype=np.float64)
+        return self._numbers((key,), value, length, infinite=infinite)
 
     def numbers(self, key: str) -> Array:
         """Return an array of finite numbers, of any length.
@@ -332,11 +336,12 @@ class Table:
             got = f"{value:g}" if isinstance(value, float) else "an integer of many digits"
             raise self._error_at(keys, f"expected a number no larger than {LARGEST:g}, got {got}")
 
-    def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
+    def _numbers(self, keys: Keys, value: Any, length: int | Collection[int], *, infinite: bool = False) -> Array:
         if not isinstance(value, list):
             raise self._error_at(keys, f"expected a list of {_numbers_text(length)}, got {_value_text(value)}")
         for i, item in enumerate(value):
-            self._require_number((*keys, i), item)
+            if not (infinite and item == math.inf):
+                self._require_number((*keys, i), item)
         if len(value) not in ((length,) if isinstance(length, int) else length):
             raise self._error_at(keys, f"expected {_numbers_text(length)}, got {len(value)}")
         return np.array(value, dtype=np.float64)

@@ -37,6 +37,8 @@ _SMALL = 1e-9
 # Of the distance of any polynomials from a line: samples are so dense that they miss no more than this [m], [rad], but
 # there are no more than so many on an interval.
 _LINE_MISSED, _MAX_LINE_SAMPLES = 1e-6, 1000
+# Configurations at which the paths of two motions are compared.
+_COMPARED = 501
 # Positions of the tool and entries of its rotation are computed to so many roundings.
 ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
@@ -494,6 +496,25 @@ def distance_from_line(arm: AnyArm, trajectory: Trajectory, A: Array, B: Array) 
         samples=count,
         backward=float((np.maximum.accumulate(way) - way).max() + 2 * (between * tool.acceleration).max()),
     )
+
+
+def path_deviation(arm: AnyArm, planned: Trajectory, run: Trajectory) -> float:
+    """Return the largest distance of the tool from the path of another motion, at samples [m].
+
+    Args:
+        arm: the arm, or a compiled one.
+        planned: the motion with that path.
+        run: the motion that leaves it.
+    """
+    forward = solver_of(arm).forward
+    place, there = (forward(each(np.linspace(0, each.duration, _COMPARED)))[:, :3, 3] for each in (planned, run))
+    starts, chords = place[:-1], np.diff(place, axis=0)
+    squares = np.maximum((chords**2).sum(axis=1), 1e-300)
+    worst = 0.0
+    for p in there:
+        part = np.clip(((p - starts) * chords).sum(axis=1) / squares, 0, 1)
+        worst = max(worst, float(np.linalg.norm(p - starts - part[:, None] * chords, axis=1).min()))
+    return worst
 
 
 def _tool_bounds(arm: Arm, trajectory: Trajectory) -> tuple[ToolBounds, Array]:

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, NamedTuple, get_args
 
 import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.flexible_joints import deflection, modes
+from armwright.dynamics.flexible_joints import links_at_rest, modes
 from armwright.errors import IncapableArmError, InvalidValueError, counted, one_of
 from armwright.files.result_table import ResultTable
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.certificate import slowing
-from armwright.motion.deviation import distance_from_line
+from armwright.motion.deviation import distance_from_line, path_deviation
 from armwright.motion.flat_feedforward import FlatMotion, flat_motion, ninth
 from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
-from armwright.motion.mode_shaping import ModeShaping, mode_shaper
+from armwright.motion.mode_shaping import Smoothing, mode_shaper
 from armwright.motion.moves import Move
 from armwright.motion.shaping import Shaper, ShaperKind, shaped
 from armwright.motion.solver import AnyArm, solver_of
@@ -27,7 +26,6 @@ from armwright.simulation.flexible_joints import simulate_flexible
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Status
 
-Smoothing: TypeAlias = Literal["zv", "zvd", "ei", "flat"]
 # Configurations at which paths are compared.
 _COMPARED = 2001
 # Rounds in which a move is slowed until it keeps its limits, and what more it is slowed by.
@@ -36,8 +34,6 @@ _ROUNDS, _MORE = 30, 1e-3
 _WATCHED, _WATCH = 5.0, (0.2, 10.0)
 # An arm is at rest when its tool stays so near to its end [m].
 _AT_REST = 1e-4
-# No gear that carries an arm is deflected farther by its weight [rad], [m].
-_SOFT = 1.0
 # So far apart may motors be where a leg ends and the next begins [rad], [m].
 _GAP = 1e-5
 # An end of a move is at rest where nothing is faster [rad/s], [m/s].
@@ -155,7 +151,7 @@ def smooth_move(
     ends = planned(np.array((0.0, planned.duration)), 1)
     if np.abs(ends).max() > _STANDS:
         raise InvalidValueError("ends: a move that leaves no vibration starts and ends at rest; expected ends at rest")
-    _at_rest(solver.arm, planned(0.0))
+    links_at_rest(solver.arm, planned(0.0))
     straight = bool(move.tool_path or move.detours)
     if smoothing == "flat":
         if straight:
@@ -163,7 +159,7 @@ def smooth_move(
                 "flat feedforward needs four derivatives of the joints, and straight lines of the tool have two; "
                 "expected a joint move, or zv, zvd or ei"
             )
-        command = _flat(solver.arm, move)
+        command = _flat(arm, move)
     else:
         command = _shaped(arm, move, smoothing, count=count, tolerance=tolerance)
     bounds = _straight(solver.arm, move, command.parts, smoothing, allowed) if straight else None
@@ -188,7 +184,7 @@ def smooth_move(
         smoothing=smoothing,
         frequencies=command.frequencies,
         added=motors.duration - planned.duration,
-        deviation=_path_deviation(solver.arm, planned, command.links),
+        deviation=path_deviation(solver.arm, planned, command.links),
         line=None if bounds is None else (bounds, allowed),
         before=settling(solver.arm, command.before),
         after=settling(solver.arm, motors),
@@ -207,11 +203,11 @@ def settling(arm: Arm, motors: Trajectory) -> Settling:
         UnsupportedArmError: no gear is flexible, drives are coupled, or the mass of a link is unknown.
         IncapableArmError: the gears do not carry the weight, or the simulation fails.
     """
-    end = _at_rest(arm, motors(motors.duration))
+    end = links_at_rest(arm, motors(motors.duration))
     watched = float(np.clip(_WATCHED / modes(arm, end).frequencies[0], *_WATCH))
     run = simulate_flexible(
         arm,
-        _at_rest(arm, motors(0.0)),
+        links_at_rest(arm, motors(0.0)),
         duration=motors.duration + watched,
         motors=motors,
         integrator=Adaptive(rtol=1e-6, atol=1e-8),
@@ -224,20 +220,6 @@ def settling(arm: Arm, motors: Trajectory) -> Settling:
     last = int(far[-1]) + 1 if len(far) else 0
     after = run.t >= motors.duration - 1e-9
     return Settling(float(distance[after].max()), float(run.t[last]) if last < len(run.t) else None)
-
-
-def _at_rest(arm: Arm, theta: Array) -> Array:
-    """Return where the links stand on their gears when the motors stand at theta (n,)."""
-    q = theta
-    for _ in range(100):
-        q, last = theta + deflection(arm, q), q
-        if np.abs(q - last).max() < 1e-12:
-            return q
-        if np.abs(q - theta).max() > _SOFT:
-            break
-    raise IncapableArmError(
-        f"arm '{arm.name}': its gears are so soft that its weight bends them without end; check their stiffness"
-    )
 
 
 class _Command(NamedTuple):
@@ -258,7 +240,7 @@ class _Command(NamedTuple):
     delay: float
 
 
-def _flat(arm: Arm, move: Move) -> _Command:
+def _flat(arm: AnyArm, move: Move) -> _Command:
     """Return the command of flat feedforward from pose to pose."""
     legs = _flat_legs(arm, move)
     return _Command([leg.motors for leg in legs], join([leg.links for leg in legs]), move.trajectory, np.zeros(0), 0.0)
@@ -266,8 +248,7 @@ def _flat(arm: Arm, move: Move) -> _Command:
 
 def _shaped(arm: AnyArm, move: Move, kind: ShaperKind, *, count: int, tolerance: float) -> _Command:
     """Return the command of shapers for the slowest modes."""
-    shaping = ModeShaping(kind=kind, count=count, tolerance=tolerance)
-    by, frequencies = mode_shaper(solver_of(arm).arm, move.trajectory, shaping)
+    by, frequencies = mode_shaper(solver_of(arm).arm, move.trajectory, kind, count=count, tolerance=tolerance)
     legs, parts = _shaped_legs(arm, _legs(move), by)
     return _Command(parts, join(parts), join(legs), frequencies, float(by.parts @ by.delays))
 
@@ -288,22 +269,18 @@ def _shaped_legs(arm: AnyArm, legs: list[Trajectory], by: Shaper) -> tuple[list[
     raise IncapableArmError("no slower motion keeps its limits when it is shaped")
 
 
-def _flat_legs(arm: Arm, move: Move) -> list[FlatMotion]:
+def _flat_legs(arm: AnyArm, move: Move) -> list[FlatMotion]:
     """Return legs of order 9 from pose to pose that keep the limits of links and motors."""
     legs = []
-    limits = arm.limits
+    model = solver_of(arm).arm
     for start, goal, planned in zip(move.configurations, move.configurations[1:], np.diff(move.times), strict=False):
         duration = float(planned)
         for _ in range(_ROUNDS):
-            links = ninth(start, goal, duration)
-            factor, _because = slowing_for_limits(arm, links)
+            leg = flat_motion(model, ninth(start, goal, duration))
+            factor, _because = leg.slowing(arm)
             if factor <= 1 + ROUNDING:
-                leg = flat_motion(arm, links)
-                efforts = float((np.abs(leg.efforts) / limits.effort).max())
-                factor = max(slowing(arm, leg.motors)[0], efforts**0.5)
-                if factor <= 1 + ROUNDING:
-                    legs.append(leg)
-                    break
+                legs.append(leg)
+                break
             duration *= factor * (1 + _MORE)
         else:
             raise IncapableArmError(
@@ -343,15 +320,3 @@ def _passing(command: Trajectory, configurations: Array) -> Array:
     """Return how near a motion passes configurations in the space of the joints, (k,), at samples."""
     q = command(np.linspace(0, command.duration, _COMPARED))
     return np.array([np.linalg.norm(q - each, axis=1).min() for each in configurations])
-
-
-def _path_deviation(arm: Arm, planned: Trajectory, links: Trajectory) -> float:
-    """Return the largest distance of the tool from the path that was planned, at samples."""
-    place, there = (forward(arm, each(np.linspace(0, each.duration, _COMPARED)))[:, :3, 3] for each in (planned, links))
-    starts, chords = place[:-1], np.diff(place, axis=0)
-    squares = np.maximum((chords**2).sum(axis=1), 1e-300)
-    worst = 0.0
-    for p in there:
-        part = np.clip(((p - starts) * chords).sum(axis=1) / squares, 0, 1)
-        worst = max(worst, float(np.linalg.norm(p - starts - part[:, None] * chords, axis=1).min()))
-    return worst

@@ -13,11 +13,14 @@ from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, dimens
 from armwright.program.semantics.builtins import is_joints, joint_target
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import expression_text
-from armwright.program.semantics.move import SPEED_NOTE, no_flexible_gear
+from armwright.program.semantics.move import SPEED_NOTE, no_flat_line, no_flexible_gear
 from armwright.program.syntax import tree
 
 # Clauses whose value is a number.
 _VALUED = (tree.Blend, tree.Duration, *tree.TOOL_LIMITS, tree.Correction, tree.Bound, tree.Rate)
+
+# Ways along straight lines, which flat feedforward does not shape.
+_LINES = (tree.Straightly, tree.Departure, tree.Approach)
 
 
 def move(context: Context, node: tree.Move) -> None:
@@ -64,7 +67,7 @@ def _start_move(state: FlowState, node: tree.Move) -> str | None:
         elif isinstance(clause, tree.Tracking):
             _check_tracking(state, clause)
         elif isinstance(clause, tree.Smoothly):
-            _check_smooth(state, clause, arm)
+            _check_smooth(state, node, clause, arm)
     if arm is None:
         return None
     _warn_of_released_frame(state, node, arm)
@@ -217,13 +220,18 @@ def _check_tracking(state: FlowState, clause: tree.Tracking) -> None:
     state.report("E249", text, clause.point.span, "nothing to track", note=note, advice=advice)
 
 
-def _check_smooth(state: FlowState, clause: tree.Smoothly, arm: str | None) -> None:
-    """Check that an arm has gears whose vibrations can be shaped, as far as the cell says so."""
+def _check_smooth(state: FlowState, node: tree.Move, clause: tree.Smoothly, arm: str | None) -> None:
+    """Check that the vibrations of an arm can be shaped on the way that a MOVE goes, as far as the cell says so."""
     cell = state.cell
-    if cell is None or cell.flexible is None or arm not in cell.arms or arm in cell.flexible:
+    if cell is None or arm is None or arm not in cell.arms:
         return
-    text, advice = no_flexible_gear(arm)
-    state.report("E259", text, clause.span, "nothing vibrates", advice=advice)
+    if cell.flexible is not None and arm not in cell.flexible:
+        text, advice = no_flexible_gear(arm)
+        state.report("E259", text, clause.span, "nothing vibrates", advice=advice)
+    elif arm in cell.flat and (line := next((it for it in node.clauses if isinstance(it, _LINES)), None)):
+        text, advice = no_flat_line(arm)
+        here = labels(clause.span, "shaped against vibrations here")
+        state.report("E258", text, line.span, "a straight line", secondary=here, advice=advice)
 
 
 def check_speed(state: FlowState, node: tree.Expression) -> None:

@@ -28,6 +28,7 @@ class KnownCell:
         joints: of each arm whose joints are known a letter for each, R for one that turns and P for one that slides.
         moving: the frames that move by themselves; None when nothing is known of them.
         flexible: the arms with a gear that is a spring; None when nothing is known of them.
+        flat: the arms whose MOVEs SMOOTHLY are shaped by flat feedforward.
         targets: the joint targets, each with its arm; None when nothing is known of them.
     """
 
@@ -42,6 +43,7 @@ class KnownCell:
     targets: Mapping[str, str] | None = None
     moving: frozenset[str] | None = None
     flexible: frozenset[str] | None = None
+    flat: frozenset[str] = frozenset()
 
 
 @attrs.frozen(kw_only=True)
@@ -90,6 +92,7 @@ def known_cell(cell: Cell) -> KnownCell:
         flexible=frozenset(
             name for name, it in cell.arms.items() if np.isfinite(it.arm.motor_values("stiffness")).any()
         ),
+        flat=frozenset(name for name, it in cell.arms.items() if it.smooth.kind == "flat"),
     )
 
 

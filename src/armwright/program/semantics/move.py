@@ -150,6 +150,13 @@ def no_flexible_gear(arm: str) -> tuple[str, str]:
     return text, f"give stiffness_Nm_per_rad in the arm file or in `[arms.{arm}.smooth]` of the cell"
 
 
+def no_flat_line(arm: str) -> tuple[str, str]:
+    """Return what is to be said of a MOVE SMOOTHLY by flat feedforward along a straight line, and the advice."""
+    text = f"the shaper of {arm} is flat feedforward, which shapes motions of the joints and no straight line"
+    advice = "write a MOVE of its own for the line, STRAIGHTLY and without SMOOTHLY"
+    return text, f"{advice}, or choose zvd in `[arms.{arm}.smooth]` of the cell"
+
+
 def _check_smooth(names: NameResolver, first: dict[type, tree.Clause]) -> None:
     """Check that a MOVE that is shaped goes a way that can be."""
     smooth = first.get(tree.Smoothly)

@@ -11,7 +11,7 @@ from armwright.motion.plan import PlannedStage
 from armwright.motion.smooth_stages import LeftLineError, certified, lasting, smooth_stages
 from armwright.motion.solver import AnyArm
 from armwright.program.bytecode.instructions import stages_of
-from armwright.program.semantics.move import no_flexible_gear
+from armwright.program.semantics.move import no_flat_line, no_flexible_gear
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.move_request import MoveRequest
 from armwright.program.vm.process import Process
@@ -37,13 +37,17 @@ def smoothed_stages(
         planner: what they were planned with.
 
     Raises:
-        RunError: the arm has rigid gears, a straight line would be left, or no slower motion keeps the limits.
+        RunError: the arm has rigid gears, a straight line would be left or is none for flat feedforward, or no slower
+            motion keeps the limits.
     """
     cell, span = machine.cell, request.span
     shaping = cell.arms[arm].smooth
     if not np.isfinite(cell.arms[arm].arm.motor_values("stiffness")).any():
         text, advice = no_flexible_gear(arm)
         raise machine.error(process, "E259", text, span, "nothing vibrates", helps=[advice])
+    if shaping.kind == "flat" and any(stage.kind == "LINE" for stage in stages):
+        text, advice = no_flat_line(arm)
+        raise machine.error(process, "E258", text, span, "goes along a straight line", helps=[advice])
     fixed = request.duration is not None
     try:
         smooth = smooth_stages(planner, stages, shaping, cell.period, tool=request.tool)
