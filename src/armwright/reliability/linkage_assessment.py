@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -33,7 +33,9 @@ from armwright.reliability.tip_samples import tip_samples
 from armwright.reliability.tolerances import SHOWN
 from armwright.reliability.wear_measurements import MOST_STROKES, WearMeasurement, measured_residuals
 from armwright.reliability.weighted_draws import draw
-from armwright.sweep.machines import Machines
+
+if TYPE_CHECKING:
+    from armwright.sweep.machines import Machines
 
 # The linear law is said to be off where its errors differ by more from those of the equilibrium, in parts of their
 # spread; or where the probabilities of both differ by more than this many of the standard errors of the sample.

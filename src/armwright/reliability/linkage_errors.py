@@ -27,7 +27,7 @@ from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tip_errors import sampled_tip_errors
-from armwright.reliability.tip_samples import TipErrorTask
+from armwright.reliability.tip_samples import LINKAGES, TipErrorTask
 
 Shape: TypeAlias = Literal["normal", "lognormal"]
 SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
@@ -37,6 +37,8 @@ _FLAT = 1e-12
 _WIDEST = 1.0
 # Logarithm of a factor that is beyond every limit, and whose square can be represented.
 LARGEST_LOG = 100.0
+# Equilibria that are solved at once, where clearances alone differ.
+_EQUILIBRIA = 20_000
 # Standard deviation of a number that is evenly spread from -1 to 1.
 _EVEN = 1 / np.sqrt(3.0)
 # The least clearance that has a direction [m].
@@ -320,7 +322,7 @@ class RandomLinkage:
                 "deviations": dict(self.deviations),
                 "friction": self.friction,
             },
-            vectorized=not self.deviations,
+            block=LINKAGES if self.deviations else max(1, _EQUILIBRIA // len(self.q)),
         )
 
     def _tips(self, clearances: Array, z: Array) -> Array:

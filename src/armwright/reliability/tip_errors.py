@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from armwright.reliability.assessment import Mechanism, ToleranceAssessment, ass
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tip_samples import TipErrorTask, tip_samples
 from armwright.reliability.tolerances import Tolerance
-from armwright.sweep.machines import Machines
+
+if TYPE_CHECKING:
+    from armwright.sweep.machines import Machines
 
 # A play and a length that move the tip in directions with a larger cosine are as good as one.
 _ALIKE = 0.99

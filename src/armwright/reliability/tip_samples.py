@@ -7,7 +7,7 @@ same bits wherever they are computed, in one go or after an interruption.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -15,11 +15,13 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 from armwright.sweep.designs import Design
-from armwright.sweep.machines import Machines, evaluate_on
 from armwright.sweep.task import FAILURE, Axis, Output, Status
 
-# Equilibria that are solved at once, and linkages where each is solved by itself: about a second of work.
-_EQUILIBRIA, _LINKAGES = 20_000, 64
+if TYPE_CHECKING:
+    from armwright.sweep.machines import Machines
+
+# Linkages that are computed at once, where each takes some hundredths of a second.
+LINKAGES = 64
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -32,24 +34,19 @@ class TipErrorTask:
         errors: returns (s, p, 2) errors in complete equilibrium [m] for (s, k) numbers, each row for itself; it can be
             pickled.
         settings: all else that the errors depend on, as JSON data.
-        vectorized: whether many linkages are solved at once.
+        block: linkages that are computed at once, about a second of work.
     """
 
     linkage: str
     poses: int
     errors: Callable[[Array], Array]
     settings: Mapping[str, Any]
-    vectorized: bool = False
+    block: int = LINKAGES
 
     @property
     def name(self) -> str:
         """The name of the task."""
         return f"random linkages of {self.linkage} at rest"
-
-    @property
-    def block(self) -> int:
-        """How many linkages make a block."""
-        return max(1, _EQUILIBRIA // self.poses) if self.vectorized else _LINKAGES
 
     @property
     def outputs(self) -> Mapping[str, Output]:
@@ -100,6 +97,8 @@ def tip_samples(
             if say is not None:
                 say(f"random linkages in equilibrium: {start + len(found[-1])} of {len(numbers)}")
         return np.concatenate(found)
+    from armwright.sweep.machines import evaluate_on  # noqa: PLC0415 - a slow import
+
     names = tuple(f"x{k}" for k in range(1, numbers.shape[1] + 1))
     rows = evaluate_on(machines, task, Design(names=names, points=numbers, seed=seed), block=task.block)
     for number in np.flatnonzero(rows["status"] != Status.DONE).tolist():
