@@ -105,7 +105,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
     which pin counts most. Measurements of the worn linkage (--measurements) update both. With -o, report.html shows the
-    curves with their bands.
+    curves with their bands. With --workers the random linkages are a sweep; with -o it can be resumed.
 
     **Example:** `armwright clearance reliability five-bar --pose -180,-600 --clearance J2=0.328 --limit 0.9`
     """

@@ -65,7 +65,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
     every journal rests against its bearing. The command prints the shift by mean clearances, the longest error with all
     dimensions at the ends of their tolerances, the statistical error, each dimension's share, and with --limit the
     probability that the error is longer, at a pose and anywhere on the path. With -o it writes report.html,
-    tolerance.json and figures (SVG).
+    tolerance.json and figures (SVG). With --workers the random linkages are a sweep; with -o it can be resumed.
 
     **Example:** `armwright clearance tolerance five-bar examples/five_bar_tolerances.toml --path y1 --limit 0.1`
     """

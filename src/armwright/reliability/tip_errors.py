@@ -32,12 +32,7 @@ if TYPE_CHECKING:
 _ALIKE = 0.99
 
 
-def sampled_tip_errors(
-    linkage: Linkage,
-    q: ArrayLike,
-    names: Sequence[str],
-    deviations: ArrayLike,
-) -> Array:
+def sampled_tip_errors(linkage: Linkage, q: ArrayLike, names: Sequence[str], deviations: ArrayLike) -> Array:
     """Return by how much the tips of linkages whose dimensions deviate rest elsewhere, in full equilibrium.
 
     Args:

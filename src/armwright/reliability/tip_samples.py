@@ -15,6 +15,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 from armwright.sweep.designs import Design
+from armwright.sweep.errors import SweepError
 from armwright.sweep.task import FAILURE, Axis, Output, Status
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def tip_samples(
 
     Raises:
         InvalidValueError: a linkage has no equilibrium.
+        SweepError: the workers cannot do it; see ``sweep.run``.
     """
     if machines is None:
         found: list[Array] = []
@@ -102,5 +104,8 @@ def tip_samples(
     names = tuple(f"x{k}" for k in range(1, numbers.shape[1] + 1))
     rows = evaluate_on(machines, task, Design(names=names, points=numbers, seed=seed), block=task.block)
     for number in np.flatnonzero(rows["status"] != Status.DONE).tolist():
-        raise InvalidValueError(f"random linkage {number + 1} of {len(numbers)}: {rows['message'][number]}")
+        text = f"random linkage {number + 1} of {len(numbers)}: {rows['message'][number]}"
+        if rows["status"][number] == Status.KILLED:
+            raise SweepError(f"{text}; use another folder to try again")
+        raise InvalidValueError(text)
     return np.stack([rows["error_x"], rows["error_y"]], axis=-1)

@@ -29,7 +29,7 @@ class Machines:
 
     workers: int | None = None
     scheduler: str | None = None
-    folder: Path | None = None
+    folder: Path | str | None = None
     progress: Callable[[Progress], None] | None = None
 
 
