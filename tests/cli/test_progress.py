@@ -2,7 +2,7 @@
 
 import pytest
 
-from armwright.cli.progress import counting, parts, progress_text, sweep_bar, waiting
+from armwright.cli.progress import counting, parts, progress_text, sample_bar, sweep_bar, waiting
 from armwright.sweep.progress import Progress
 
 
@@ -29,8 +29,9 @@ def test_words(changes: dict[str, float], text: str) -> None:
 
 def test_nobody_watches(capfd: pytest.CaptureFixture[str]) -> None:
     """Where the error output is no terminal there is no bar."""
-    with sweep_bar("sweep") as bar:
+    with sweep_bar("sweep") as bar, sample_bar("samples") as pair:
         assert bar is None
+        assert pair == (None, None)
 
     assert capfd.readouterr() == ("", "")
 
@@ -45,6 +46,11 @@ def test_person_watches(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
         bar(progress(failed=3))
     with sweep_bar("slider-crank", quiet=True) as none:
         assert none is None
+    with sample_bar("four-bar") as (words, bar):
+        assert words is not None
+        assert bar is not None
+        bar(progress(done=429))
+        words("probabilities")
 
     out, shown = capsys.readouterr()
     assert out == ""
@@ -52,6 +58,8 @@ def test_person_watches(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     assert "129/729" in shown
     assert "3 failed" in shown
     assert "slider-crank" not in shown
+    for text in ("four-bar", "429/729", "probabilities"):
+        assert text in shown
 
 
 def test_nobody_waits(capfd: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ from armwright.reliability.exceedance import exceedance
 from armwright.reliability.first_order import form, reliability_index
 from armwright.reliability.linear_error import LinearError, fosm
 from armwright.reliability.linkage_errors import RandomClearances, RandomLinkage
+from armwright.reliability.tip_samples import tip_samples
 from samples import Sample
 
 Q1, MEAN, DEVIATION = (-0.18, -0.6), np.array([0.328, 0.171, 0.483]) * 1e-3, 2e-5
@@ -248,7 +249,7 @@ def test_a_million_equilibria(sample: Sample) -> None:
     random, count = at_rest(Q1), sample.count(1_000_000)
     limits = np.array([0.58, 0.60, 0.62]) * 1e-3
     z = np.random.default_rng(sample.seed).normal(size=(count, 3))
-    sizes = np.linalg.norm(random.equilibria(z)[:, 0], axis=-1)
+    sizes = np.linalg.norm(tip_samples(random.task, z, seed=sample.seed)[:, 0], axis=-1)
     exact = np.array([random.error.pose_probabilities(limit)[0] for limit in limits])
     found = (sizes[:, None] > limits).mean(axis=0)
     scores = np.abs(found - exact) / np.sqrt(exact * (1 - exact) / count)

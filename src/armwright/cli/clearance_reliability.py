@@ -9,9 +9,9 @@ from armwright.cli.linkages import LinkageName, SpeedRpm, WidthMm, path_of, pose
 from armwright.cli.numbers import named_numbers
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
-from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.shell_completion import paths
+from armwright.cli.sweeps import SampleScheduler, SampleWorkers, sampling
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
@@ -93,6 +93,8 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
+    workers: SampleWorkers = None,
+    scheduler: SampleScheduler = None,
     output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -103,7 +105,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
     at the worst pose, by the exact law, at any pose, and of random linkages in complete equilibrium. With --k the pins
     wear: printed are the strokes that 95, 90 (B10), 50 and 5 % reach, with the intervals of the wear coefficient, and
     which pin counts most. Measurements of the worn linkage (--measurements) update both. With -o, report.html shows the
-    curves with their bands.
+    curves with their bands. With --workers the random linkages are a sweep; with -o it can be resumed.
 
     **Example:** `armwright clearance reliability five-bar --pose -180,-600 --clearance J2=0.328 --limit 0.9`
     """
@@ -145,7 +147,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
         )
     elif measurements is not None or limit_rp is not None or strokes is not None:
         raise usage_error("--k", "strokes, measurements and a limit of RP need the wear coefficient, --k")
-    with waiting("linkages", quiet=quiet or as_json) as progress:
+    with sampling("random linkages", workers, scheduler, output, quiet=quiet or as_json) as (progress, machines):
         assessment = assess_linkage(
             model,
             closed_along(model, way, poses) if way and not pose else closed_at(model, poses_of(model, pose or [])),
@@ -162,6 +164,7 @@ def reliability(  # noqa: PLR0917 - Typer reads one parameter per option
             wear=wear,
             samples=samples,
             seed=seed,
+            machines=machines,
             progress=progress,
         )
     if output is not None:

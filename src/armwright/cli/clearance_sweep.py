@@ -10,6 +10,7 @@ from armwright.cli.numbers import named_ranges
 from armwright.cli.options import Json, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import sweep_bar, waiting
+from armwright.cli.sweeps import resumable
 
 _PAGE = "report.html"
 
@@ -104,12 +105,9 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     if not (output / RESULTS).exists():
         with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
             task(np.stack([plan.points.min(axis=0), plan.points.max(axis=0)]))
-    with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
-        try:
-            results = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
-        except BaseException as error:
-            error.add_note(f"finished runs are stored in '{output}'; the same command resumes the sweep")
-            raise
+    title = f"{len(plan.points)} linkages on {len(task.paths)} paths"
+    with sweep_bar(title, quiet=quiet or as_json) as progress, resumable(output, "runs"):
+        results = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
     with results:
         summary = sweep_summary(task, results, output)
         page = sweep_page(summary, results, name=task.linkage.name, command=command_line())

@@ -9,9 +9,9 @@ from typer import Argument, Option
 from armwright.cli.linkages import LinkageName, poses_of
 from armwright.cli.options import Json, OutputFolder, Quiet, usage_error
 from armwright.cli.output import command_line, print_result
-from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import paths
+from armwright.cli.sweeps import SampleScheduler, SampleWorkers, sampling
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
 if TYPE_CHECKING:
@@ -53,6 +53,8 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
     uniform: Annotated[
         bool, Option("--uniform", help="Deviations of the random linkages are uniform within tolerances, not normal.")
     ] = False,
+    workers: SampleWorkers = None,
+    scheduler: SampleScheduler = None,
     output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -63,7 +65,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
     every journal rests against its bearing. The command prints the shift by mean clearances, the longest error with all
     dimensions at the ends of their tolerances, the statistical error, each dimension's share, and with --limit the
     probability that the error is longer, at a pose and anywhere on the path. With -o it writes report.html,
-    tolerance.json and figures (SVG).
+    tolerance.json and figures (SVG). With --workers the random linkages are a sweep; with -o it can be resumed.
 
     **Example:** `armwright clearance tolerance five-bar examples/five_bar_tolerances.toml --path y1 --limit 0.1`
     """
@@ -85,7 +87,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
         )
     model, widths = read_linkage_tolerances(tolerances, nominal)
     places = _poses(model, pose or [], path, poses, table_file(csv, columns, skip_incomplete=skip_incomplete))
-    with waiting("longest errors", quiet=quiet or as_json) as progress:
+    with sampling("random linkages", workers, scheduler, output, quiet=quiet or as_json) as (progress, machines):
         assessment = assess_linkage_tolerances(
             model,
             places,
@@ -96,6 +98,7 @@ def tolerance(  # noqa: PLR0917 - Typer reads one parameter per option
             samples=samples,
             seed=seed,
             uniform=uniform,
+            machines=machines,
             progress=progress,
         )
     if output is not None:

@@ -101,6 +101,34 @@ def sweep_bar(title: str, *, quiet: bool = False) -> "Iterator[Callable[[Progres
         yield None if update is None else lambda now: update(now.done, now.runs, progress_text(now))
 
 
+@contextmanager
+def sample_bar(
+    title: str, *, quiet: bool = False
+) -> "Iterator[tuple[Callable[[str], None], Callable[[Progress], None]] | tuple[None, None]]":
+    """Show the progress of samples that are a sweep, and behind it what else is done.
+
+    Args:
+        title: name of the samples.
+        quiet: show nothing.
+
+    Yields:
+        update: replaces the text behind the bar; None where nothing is shown.
+        progress: see ``sweep_bar``.
+    """
+    with counting(title, quiet=quiet) as show:
+        if show is None:
+            yield None, None
+            return
+        count: tuple[int, int | None] = (0, None)
+
+        def progress(now: "Progress") -> None:
+            nonlocal count
+            count = now.done, now.runs
+            show(*count, progress_text(now))
+
+        yield lambda text: show(*count, text), progress
+
+
 def progress_text(now: "Progress") -> str:
     """Return rate, remaining time and number of failures as text."""
     words = []

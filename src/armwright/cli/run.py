@@ -24,7 +24,7 @@ from armwright.cli.programs import (
     read_arguments,
 )
 from armwright.cli.progress import waiting
-from armwright.cli.trials import MAX_TRIALS, Machines, SingleTrial, TrialVerdict, check_trial_options, run_trials
+from armwright.cli.trials import MAX_TRIALS, SingleTrial, TrialVerdict, check_trial_options, run_trials
 from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
@@ -146,13 +146,14 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     if trials is not None or trial is not None:
         check_trial_options(used_cell, trials, trial, physics=physics)
     if trials is not None:
-        machines = Machines(workers, scheduler)
+        from armwright.sweep.machines import Machines
+
         summary = run_trials(
             loaded.code,
             used_cell,
             inputs,
             limits,
-            machines,
+            Machines(workers=workers, scheduler=scheduler),
             seed=seed,
             count=trials,
             output=output,

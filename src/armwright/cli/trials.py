@@ -1,6 +1,5 @@
 """The trials of ``armwright run --physics``: many drawn cases of a cell, or one of them again."""
 
-from contextlib import closing
 from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -9,6 +8,7 @@ from armwright.cli.options import usage_error
 from armwright.cli.output import command_line
 from armwright.cli.progress import sweep_bar
 from armwright.cli.results import write_results
+from armwright.cli.sweeps import resumable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from armwright.report.run_files import RunInputs
     from armwright.report.trials_summary import Trial, TrialsSummary
     from armwright.sweep.designs import Design
+    from armwright.sweep.machines import Machines
     from armwright.sweep.progress import Progress
 
 # More trials than this are a slip.
@@ -95,19 +96,12 @@ class SingleTrial:
         return TrialVerdict(self._number, judge_run(self._world, self.case, duration, error))
 
 
-class Machines(NamedTuple):
-    """What runs trials: some processes of this machine, as many as cores where there is no number, or a scheduler."""
-
-    workers: int | None
-    scheduler: str | None
-
-
 def run_trials(
     code: "Code",
     cell: "Cell",
     inputs: "RunInputs",
     limits: "Limits",
-    machines: Machines,
+    machines: "Machines",
     *,
     seed: int,
     count: int,
@@ -118,6 +112,8 @@ def run_trials(
 
     With a folder, every finished trial is stored in it, and the same command resumes trials that were interrupted.
     """
+    import attrs
+
     from armwright.program.vm.trials import ProgramTrials
     from armwright.report.run_files import input_hashes
     from armwright.report.trials_files import trials_files
@@ -125,21 +121,16 @@ def run_trials(
 
     identity = {"options": inputs.options, "inputs": input_hashes(inputs)}
     task = ProgramTrials(code=code, cell=cell, seed=seed, limits=limits, identity=identity)
-    with sweep_bar(f"{count} trials", quiet=not watched) as progress:
-        trials = evaluate_trials(task, count, output, machines, progress)
+    folder = None if output is None else output / _FOLDER
+    with sweep_bar(f"{count} trials", quiet=not watched) as progress, resumable(folder, "trials"):
+        trials = evaluate_trials(task, count, attrs.evolve(machines, folder=folder, progress=progress))
     summary = TrialsSummary(program=inputs.program.name, cell=cell.name, seed=seed, trials=trials)
     if output is not None:
         write_results(output, trials_files(summary, command=command_line()))
     return summary
 
 
-def evaluate_trials(
-    task: "ProgramTrials",
-    count: int,
-    output: Path | None,
-    machines: Machines,
-    progress: "Callable[[Progress], None] | None" = None,
-) -> "tuple[Trial, ...]":
+def evaluate_trials(task: "ProgramTrials", count: int, machines: "Machines") -> "tuple[Trial, ...]":
     """Run trials 1 to ``count``: on the cores of the machine, or in this process without the extra ``sweep``."""
     import numpy as np
 
@@ -147,53 +138,20 @@ def evaluate_trials(
     from armwright.report.trials_summary import trial
     from armwright.sweep.designs import Design
     from armwright.sweep.extras import check_extras
+    from armwright.sweep.machines import evaluate_on
 
     design = Design(names=("trial",), points=np.arange(1.0, count + 1.0)[:, None])
     try:
         check_extras()
     except MissingExtraError:
-        columns = _evaluate_here(task, design, progress)
+        columns = _evaluate_here(task, design, machines.progress)
     else:
-        columns = _evaluate_in_sweep(task, design, output, machines, progress)
+        rows = evaluate_on(machines, task, design, block=-(-count // _MAX_BLOCKS))
+        columns = [rows[name].tolist() for name in ("message", *task.outputs)]
     return tuple(
         trial(number, message, dict(zip(task.outputs, numbers, strict=True)))
         for number, (message, *numbers) in enumerate(zip(*columns, strict=True), 1)
     )
-
-
-def _evaluate_in_sweep(
-    task: "ProgramTrials",
-    design: "Design",
-    output: Path | None,
-    machines: Machines,
-    progress: "Callable[[Progress], None] | None",
-) -> list[list[Any]]:
-    """Return the messages and the outputs of all trials; with a folder finished ones are kept in it."""
-    import tempfile
-
-    from armwright.sweep.runner import run
-
-    with tempfile.TemporaryDirectory() as passing:
-        folder = Path(passing, _FOLDER) if output is None else output / _FOLDER
-        try:
-            results = run(
-                task,
-                design,
-                folder,
-                block=-(-len(design) // _MAX_BLOCKS),
-                workers=machines.workers,
-                scheduler=machines.scheduler,
-                progress=progress,
-            )
-        except BaseException as error:
-            if output is not None:
-                error.add_note(f"finished trials are stored in '{folder}'; the same command resumes them")
-            raise
-        with closing(results):
-            messages = [
-                text.decode() if isinstance(text, bytes) else text for text in results["message"].to_numpy().tolist()
-            ]
-            return [messages, *(results[name].to_numpy().tolist() for name in task.outputs)]
 
 
 def _evaluate_here(

@@ -49,6 +49,7 @@ from .tip_errors import (
     assess_linkage_tolerances as assess_linkage_tolerances,
     sampled_tip_errors as sampled_tip_errors,
 )
+from .tip_samples import TipErrorTask as TipErrorTask, tip_samples as tip_samples
 from .tolerances import (
     Tolerance as Tolerance,
     dimensions as dimensions,

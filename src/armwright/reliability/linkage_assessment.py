@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -29,9 +29,13 @@ from armwright.reliability.linear_error import Estimate
 from armwright.reliability.linkage_errors import RandomClearances, RandomLinkage
 from armwright.reliability.linkage_life import PARTS, LinkageLife
 from armwright.reliability.linkage_wear import GapGrowth, Measure, WearingLinkage
+from armwright.reliability.tip_samples import tip_samples
 from armwright.reliability.tolerances import SHOWN
 from armwright.reliability.wear_measurements import MOST_STROKES, WearMeasurement, measured_residuals
 from armwright.reliability.weighted_draws import draw
+
+if TYPE_CHECKING:
+    from armwright.sweep.machines import Machines
 
 # The linear law is said to be off where its errors differ by more from those of the equilibrium, in parts of their
 # spread; or where the probabilities of both differ by more than this many of the standard errors of the sample.
@@ -344,6 +348,7 @@ def assess_linkage(
     wear: WearStatement | None = None,
     samples: int | None = None,
     seed: int = 0,
+    machines: Machines | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> LinkageReliability:
     """Assess how probable it is that the error of the tip passes a limit.
@@ -359,6 +364,8 @@ def assess_linkage(
         samples: how many random linkages are computed in complete equilibrium: 2000 where none is said, or 200 where
             more than clearances is random, which takes longer.
         seed: of all samples.
+        machines: that compute the random linkages as a sweep; this process where there are none. The results are the
+            same.
         progress: is told what is being done.
 
     Raises:
@@ -372,12 +379,13 @@ def assess_linkage(
         raise InvalidValueError(
             f"samples: expected at most {_MOST_EQUILIBRIA // len(random.q)} for {len(random.q)} poses, got {count}"
         )
-    say("random linkages in equilibrium")
-    z = np.random.default_rng(seed).normal(size=(count, random.size))
-    linear, full = random.drawn_errors(z), random.equilibria(z, say)
-    at_poses = on_path = beyond = None
     if limit is not None:
         check_limit(limit)
+    say("random linkages in equilibrium")
+    z = np.random.default_rng(seed).normal(size=(count, random.size))
+    linear, full = random.drawn_errors(z), tip_samples(random.task, z, seed=seed, machines=machines, say=say)
+    at_poses = on_path = beyond = None
+    if limit is not None:
         say("probabilities")
         at_poses, on_path = random.error.pose_probabilities(limit), random.error.path_probability(limit, seed=seed)
         over = [float((np.linalg.norm(x, axis=-1) > limit).any(axis=1).mean()) for x in (full, linear)]

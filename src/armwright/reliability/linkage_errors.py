@@ -9,7 +9,7 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Literal, TypeAlias
 
@@ -27,6 +27,7 @@ from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.reliability.linear_error import LinearError
 from armwright.reliability.tip_errors import sampled_tip_errors
+from armwright.reliability.tip_samples import LINKAGES, TipErrorTask
 
 Shape: TypeAlias = Literal["normal", "lognormal"]
 SHAPES: tuple[Shape, ...] = ("normal", "lognormal")
@@ -36,8 +37,8 @@ _FLAT = 1e-12
 _WIDEST = 1.0
 # Logarithm of a factor that is beyond every limit, and whose square can be represented.
 LARGEST_LOG = 100.0
-# Equilibria that are solved at once.
-_BLOCK = 20_000
+# Equilibria that are solved at once, where clearances alone differ.
+_EQUILIBRIA = 20_000
 # Standard deviation of a number that is evenly spread from -1 to 1.
 _EVEN = 1 / np.sqrt(3.0)
 # The least clearance that has a direction [m].
@@ -283,12 +284,11 @@ class RandomLinkage:
         errors = np.tensordot(steps, self.jacobian, axes=([1], [2])) + self.offset
         return np.asarray(errors + np.tensordot(shifts, self.others, axes=([1], [2])))
 
-    def equilibria(self, z: Array, say: Callable[[str], None] | None = None) -> Array:
+    def equilibria(self, z: Array) -> Array:
         """Return (s, p, 2) errors in complete equilibrium, of linkages that numbers (s, size) describe [m].
 
         Args:
             z: standard normal numbers.
-            say: is told how many are computed.
 
         Raises:
             InvalidValueError: one of the linkages cannot be assembled.
@@ -299,11 +299,31 @@ class RandomLinkage:
             means = dict(zip(self.linkage.clearances, self.clearances.mean.tolist(), strict=True))
             names = [*(f"{pin}.clearance" for pin in means), *self.deviations]
             steps = np.concatenate([clearances - self.clearances.mean, z[:, m:k] * self.spreads[m:]], axis=1)
-            errors = sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps, say)
+            errors = sampled_tip_errors(self.linkage.with_clearances(means), self.q, names, steps)
             return errors + (self.drawn_errors(z) - attrs.evolve(self, friction=False).drawn_errors(z))
-        rows = np.array_split(np.arange(len(z)), max(1, len(z) * len(self.q) // _BLOCK))
-        tips = [self._tips(clearances[block], z[block]) for block in rows]
-        return np.concatenate(tips) - tip_position(self.linkage, self.q)
+        return np.asarray(self._tips(clearances, z) - tip_position(self.linkage, self.q))
+
+    @property
+    def task(self) -> TipErrorTask:
+        """The errors in complete equilibrium, of linkages that numbers (s, size) describe."""
+        clearances = self.clearances
+        return TipErrorTask(
+            linkage=self.linkage.name,
+            poses=len(self.q),
+            errors=self.equilibria,
+            settings={
+                "linkage": self.linkage.as_data(),
+                "q": self.q.tolist(),
+                "clearances": {
+                    "mean": clearances.mean.tolist(),
+                    "covariance": clearances.covariance.tolist(),
+                    "shape": clearances.shape,
+                },
+                "deviations": dict(self.deviations),
+                "friction": self.friction,
+            },
+            block=LINKAGES if self.deviations else max(1, _EQUILIBRIA // len(self.q)),
+        )
 
     def _tips(self, clearances: Array, z: Array) -> Array:
         """Return (s, p, 2) positions of the tip in equilibrium [m]."""

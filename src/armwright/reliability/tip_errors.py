@@ -7,6 +7,8 @@ its tolerance spreads it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,19 +22,17 @@ from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.reliability.allocation import Rule
 from armwright.reliability.assessment import Mechanism, ToleranceAssessment, assess
 from armwright.reliability.linear_error import LinearError
+from armwright.reliability.tip_samples import TipErrorTask, tip_samples
 from armwright.reliability.tolerances import Tolerance
+
+if TYPE_CHECKING:
+    from armwright.sweep.machines import Machines
 
 # A play and a length that move the tip in directions with a larger cosine are as good as one.
 _ALIKE = 0.99
 
 
-def sampled_tip_errors(
-    linkage: Linkage,
-    q: ArrayLike,
-    names: Sequence[str],
-    deviations: ArrayLike,
-    say: Callable[[str], None] | None = None,
-) -> Array:
+def sampled_tip_errors(linkage: Linkage, q: ArrayLike, names: Sequence[str], deviations: ArrayLike) -> Array:
     """Return by how much the tips of linkages whose dimensions deviate rest elsewhere, in full equilibrium.
 
     Args:
@@ -40,7 +40,6 @@ def sampled_tip_errors(
         q: (p, n) its coordinates with closed pins, at which the drives are locked.
         names: of k dimensions.
         deviations: (samples, k) of these [m, rad, kg, N].
-        say: is told how many are computed.
 
     Returns:
         (samples, p, 2) from the tip of the linkage without clearance [m].
@@ -56,8 +55,6 @@ def sampled_tip_errors(
         other, shifts = deviate(linkage, dict(zip(names, own.tolist(), strict=True)))
         start = close_pins(other, closed, drives=drives + shifts)
         errors[k] = find_static_equilibrium(other, start).tip - ideal
-        if say is not None:
-            say(f"random linkages in full equilibrium: {k + 1} of {len(drawn)}")
     return errors
 
 
@@ -73,6 +70,7 @@ def assess_linkage_tolerances(
     seed: int = 0,
     uniform: bool = False,
     most: int = 200,
+    machines: Machines | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> ToleranceAssessment:
     """Assess what tolerances of a linkage's dimensions do to the position of its resting tip.
@@ -89,6 +87,8 @@ def assess_linkage_tolerances(
         seed: of all samples.
         uniform: whether the deviations of these are uniform within tolerances, and not normal.
         most: of more poses, so many are computed, evenly spread, the first and the last included.
+        machines: that compute the random linkages as a sweep; this process where there are none. The results are the
+            same.
         progress: is told what is being done.
 
     Raises:
@@ -105,9 +105,15 @@ def assess_linkage_tolerances(
         q = closed_at(linkage, every[rows])
         rest, ideal = rest_sensitivities(linkage, q), tip_position(linkage, q)
         mean = rest.tip - ideal
+        task = TipErrorTask(
+            linkage=linkage.name,
+            poses=len(q),
+            errors=partial(sampled_tip_errors, linkage, q, names),
+            settings={"linkage": linkage.as_data(), "q": q.tolist(), "deviations": names},
+        )
 
         def lengths(deviations: Array, say: Callable[[str], None]) -> Array:
-            errors = sampled_tip_errors(linkage, q, names, deviations, say)
+            errors = tip_samples(task, deviations, seed=seed, machines=machines, say=say)
             return np.asarray(np.linalg.norm(errors - mean * corrected, axis=-1), dtype=np.float64)
 
         drives = q[:, list(linkage.driven)]

@@ -5,6 +5,7 @@ from .designs import (
     sobol as sobol,
 )
 from .errors import SweepError as SweepError
+from .machines import Machines as Machines, evaluate_on as evaluate_on
 from .progress import Progress as Progress
 from .results import load as load
 from .runner import run as run

@@ -38,6 +38,10 @@ class Status(IntEnum):
     """The worker died each time the run was tried."""
 
 
+def _axis_names(value: Iterable[str]) -> tuple[str, ...]:
+    return tuple(value)
+
+
 @attrs.frozen(kw_only=True)
 class Output:
     """One quantity that a task returns.
@@ -50,7 +54,7 @@ class Output:
 
     description: str = ""
     units: str = "1"
-    dims: tuple[str, ...] = attrs.field(default=(), converter=tuple)
+    dims: tuple[str, ...] = attrs.field(default=(), converter=_axis_names)
 
 
 def _values(value: Any) -> Array:
