@@ -60,6 +60,8 @@ class LinearError:
         jacobian: (p, d, k) derivatives of the errors.
         exact: returns the errors (m, p, d) for (m, k) standard normal numbers, where they are not linear in these;
             offset and jacobian then only lead samples to failures. None where the linear law holds.
+        alone: returns the error at one pose of the p, of the deviations that count there, where many count at their own
+            pose only.
     """
 
     names: tuple[str, ...]
@@ -67,6 +69,7 @@ class LinearError:
     offset: Array = attrs.field(converter=_array)
     jacobian: Array = attrs.field(converter=_array)
     exact: Callable[[Array], Array] | None = None
+    alone: Callable[[int], LinearError] | None = None
 
     def __attrs_post_init__(self) -> None:
         """Refuse arrays that do not fit each other."""
@@ -108,9 +111,8 @@ class LinearError:
         """
         if self.exact is None:
             return np.array([exceedance(m, C, limit) for m, C in zip(self.offset, self.covariance, strict=True)])
-        return np.array(
-            [self._at(i).path_probability(limit, samples=_AT_POSE).probability for i in range(len(self.offset))]
-        )
+        at = self.alone or self._at
+        return np.array([at(i).path_probability(limit, samples=_AT_POSE).probability for i in range(len(self.offset))])
 
     def errors(self, z: Array) -> Array:
         """Return (m, p, d) the errors for standard normal numbers (m, k)."""
@@ -125,7 +127,7 @@ class LinearError:
             return self.errors(z)[:, [pose]]
 
         own = None if self.exact is None else errors
-        return attrs.evolve(self, offset=self.offset[[pose]], jacobian=self.jacobian[[pose]], exact=own)
+        return attrs.evolve(self, offset=self.offset[[pose]], jacobian=self.jacobian[[pose]], exact=own, alone=None)
 
     def path_probability(self, limit: float, *, samples: int = 100_000, seed: int = 0) -> Estimate:
         """Return the probability that the error is longer than a limit at any of the poses, by importance sampling.

@@ -231,7 +231,14 @@ class RandomLinkage:
             offset=self.offset,
             jacobian=np.concatenate(columns, axis=-1),
             exact=None if is_linear else self.drawn_errors,
+            alone=self._error_at if self.friction else None,
         )
+
+    def _error_at(self, pose: int) -> LinearError:
+        own = [pose]
+        return attrs.evolve(
+            self, q=self.q[own], offset=self.offset[own], jacobian=self.jacobian[own], others=self.others[own]
+        ).error
 
     def drawn_errors(self, z: Array) -> Array:
         """Return (s, p, 2) errors by the linear law, of linkages that numbers (s, size) describe [m]."""
