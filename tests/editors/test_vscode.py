@@ -180,6 +180,8 @@ def test_as_pygments(path: Path) -> None:
 @settings(max_examples=examples(200))
 @given(st.lists(st.sampled_from(sorted(_SCRAPS)), max_size=25).map("".join))
 @example("UNITS/")
+@example("ABS.ABS. a.b.. PROCEDURE a.b READ SYSTEM.x ZERO FORCE.y UNITS MM.z")
+@example("BRAKEEND\nRESUMEELSE )SMOOTHLYEND SMOOTHLYVIA(")
 def test_as_pygments_of_anything(text: str) -> None:
     """So has every character of texts that are no programs, unless a construction goes on over the end of a line."""
     # The grammar looks at one line at a time: it does not see what comes behind READ or PROCEDURE in the next.

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from hypothesis import assume, given, settings, strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
 from armwright.program.language.position_codec import PositionCodec
@@ -38,7 +38,7 @@ COLOURS = {
 
 # Texts that look like programs more often than chance would have it.
 _SCRAPS = (
-    *(RESERVED | UNITS.keys() | FUNCTIONS.keys() | frozenset(SENSORS)),
+    *(RESERVED | WORDS_IN_CONTEXT | UNITS.keys() | FUNCTIONS.keys() | frozenset(SENSORS)),
     *("ARM_1", "arm-2", "ARM", "x", "a_1", "1", "0.5", "1E5", "2mm", "10 ", "\r\n100 ", '"text"', "{ a }", "// b\n"),
     *("<=", "<>", ">=", *" \t\n;,.:=()[]+-*/<>#'{}"),
 )
@@ -264,6 +264,9 @@ END.
 
 @settings(max_examples=examples(300))
 @given(PIECES)
+@example("ABS.ABS. a.b.. A.IF IF.a ARM_1.x PROCEDURE a.b")
+@example("BRAKEEND\nRESUMEELSE )SMOOTHLYEND SMOOTHLYVIA(")
+@example("READ SYSTEM.x ZERO FORCE.y UNITS MM.z")
 def test_cut_like_the_translator(text: str) -> None:
     """Of any text without damage the lexer and the translator see the same tokens."""
     source = Source("t.rlo", text)

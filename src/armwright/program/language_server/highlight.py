@@ -42,7 +42,7 @@ KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
 RESERVED_WORDS = rf"(?:{'|'.join(sorted(_VOCABULARY.reserved))})(?!\w)"
 _BEFORE_NAME = rf"(?=[ \t]+(?!{RESERVED_WORDS})[A-Z])"
 _BEFORE_VALUE = rf"(?=[ \t]+(?:NOT(?!\w)|(?!{RESERVED_WORDS})[A-Z0-9\"]))"
-_AT_END = r"(?=[ \t]*(?:;|[\r\n]|$|END(?!\w)|ELSE(?!\w)))"
+_AT_END = r"(?!\w)(?=[ \t]*(?:;|[\r\n]|$|END(?!\w)|ELSE(?!\w)))"
 # Where a line or a statement begins.
 _AT_START = r"(?:^|(?<=;)|(?<=[;\t0-9] )|(?<=  )|(?<=BEGIN )|(?<=THEN )|(?<=ELSE )|(?<=DO ))"
 
@@ -77,7 +77,7 @@ CONTEXT_PATTERNS = (
     ("keyword", rf'{_words(STATEMENTS_BEFORE_TEXT)}(?=[ \t]*")'),
     ("keyword", rf"{_AT_START}{_words(STATEMENTS_ALONE)}{_AT_END}"),
     ("keyword", rf"(?<=WITH ){_words({*WITH_CLAUSES_IN_CONTEXT, *_MORE_CLAUSES})}(?=[ \t]*=)"),
-    ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?=[ \t]*,?[ \t]*VIA(?!\w))"),
+    ("keyword", rf"(?<!\bTO ){_words(PLAIN_CLAUSES_IN_CONTEXT)}(?!\w)(?=[ \t]*,?[ \t]*VIA(?!\w))"),
     ("keyword", rf"(?:(?<=[)\]])|(?<=[)\]] )|(?<=[)\]], )){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
     ("keyword", rf"{_BEHIND_NAME}{_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
     ("keyword", rf"(?<=LY, ){_words(PLAIN_CLAUSES_IN_CONTEXT)}{_BEFORE_CLAUSE}"),
@@ -88,6 +88,8 @@ _KINDS = {"declaration": Keyword.Declaration, "type": Keyword.Type, "keyword": K
 
 _PART = r"(?a:[A-Z]\w*)"
 _NAME = rf"{_PART}(?!\w)"
+# The name of a module or a record, and what is behind its point; behind a keyword the point ends the program.
+_QUALIFIED = rf"(?!(?a:{RESERVED_WORDS})){_PART}(?:\.{_PART})+(?!\w)"
 _NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
 
 
@@ -96,10 +98,15 @@ def _any_of(words: Collection[str]) -> str:
     return rf"(?a:{'|'.join(sorted(words))})(?!\w)"
 
 
+def _alone(words: Collection[str]) -> str:
+    """Return a pattern for one of some words, not as the first part of a qualified name either."""
+    return rf"{_any_of(words)}(?!\.[^\W\d_])"
+
+
 def _phrases() -> Iterator[tuple[str, _TokenType, str]]:
     """Yield the rules of words that start a statement in front of another one."""
     for one, other in STATEMENT_PHRASES.items():
-        yield rf"(?a:{one}(?=[ \t]+{other}(?!\w)))", Keyword.Pseudo, "phrase"
+        yield rf"(?a:{one}(?=[ \t]+{_alone([other])}))", Keyword.Pseudo, "phrase"
 
 
 def _context_rules() -> Iterator[tuple[str, _TokenType] | tuple[str, _TokenType, str]]:
@@ -149,8 +156,7 @@ class RloLexer(RegexLexer):
         "operand": [
             (r"(?a:ARM[-_][0-9]+)(?!\w)", Name.Builtin.Pseudo),
             (r"(?a:ARM)(?:(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+)?(?!\w)", Error),
-            # The name of a module or a record, and what is behind its point.
-            (rf"(?!{_any_of(_VOCABULARY.reserved)}){_PART}(?:\.{_PART})+(?![\w.])", Name),
+            (_QUALIFIED, Name),
             (rf"{_NUMBER}(?={_any_of(UNITS)}(?!\.))", Number, "unit"),
             (rf"{_NUMBER}(?![\w.])", Number),
             (r"\.?[0-9](?:[\w.]|(?<=E)[+-](?=[0-9]))*", Error),
@@ -167,12 +173,13 @@ class RloLexer(RegexLexer):
             (r"<=|>=|<>|[=<>+*/-]", Operator),
             (r"[;,:.()\[\]]", Punctuation),
         ],
-        "sensor": [include("blank"), (_any_of(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
-        "phrase": [include("blank"), (_any_of(STATEMENT_PHRASES.values()), Keyword.Pseudo, "#pop")],
-        "units": [include("blank"), (_any_of(UNITS), Keyword.Type), (r",", Punctuation), default("#pop")],
+        "sensor": [include("blank"), (_alone(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
+        "phrase": [include("blank"), (_alone(STATEMENT_PHRASES.values()), Keyword.Pseudo, "#pop")],
+        "units": [include("blank"), (_alone(UNITS), Keyword.Type), (r",", Punctuation), default("#pop")],
         "unit": [(_any_of(UNITS), Keyword.Type, "#pop")],
         "procedure": [
             include("blank"),
+            (_QUALIFIED, Name.Function, "#pop"),
             (rf"(?!{_any_of(_VOCABULARY.reserved)}){_NAME}", Name.Function, "#pop"),
             default("#pop"),
         ],
