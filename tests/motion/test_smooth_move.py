@@ -73,9 +73,10 @@ def test_damped_shapers(sample: Sample) -> None:
         assert both.residual(1.1 * f, z) == pytest.approx(left_over(both, 1.1 * f, z), rel=1e-6, abs=1e-9)
 
 
-def test_shaped_motion(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("more", [(), (23.0, 31.0, 57.0, 93.0)])
+def test_shaped_motion(rng: np.random.Generator, more: tuple[float, ...]) -> None:
     """A shaped motion is the sum of its delayed parts, between all knots, and no faster than before."""
-    by = combined([shaper("zvd", 7.4, 0.01), shaper("ei", 19.0, 0.02)])
+    by = combined([shaper("zvd", 7.4, 0.01), shaper("ei", 19.0, 0.02), *(shaper("zvd", f) for f in more)])
     found = shaped(PLAIN, by)
     t = rng.uniform(-0.1, found.duration + 0.1, 300)
 

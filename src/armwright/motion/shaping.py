@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import reduce
 from typing import Literal, TypeAlias, get_args
 
 import attrs
@@ -34,10 +35,12 @@ class Shaper:
     Attributes:
         parts: (k,) positive, 1 together.
         delays: (k,) of each, rising from 0 [s].
+        factors: shapers that have the same effect one after the other; empty for itself alone.
     """
 
     parts: Array = attrs.field(converter=read_only)
     delays: Array = attrs.field(converter=read_only)
+    factors: tuple[Shaper, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -114,7 +117,7 @@ def combined(shapers: Sequence[Shaper]) -> Shaper:
             )
         parts, delays = np.outer(parts, each.parts).ravel(), np.add.outer(delays, each.delays).ravel()
     order = np.argsort(delays, kind="stable")
-    return Shaper(parts=parts[order], delays=delays[order])
+    return Shaper(parts=parts[order], delays=delays[order], factors=tuple(shapers))
 
 
 def shaped(trajectory: Trajectory, by: Shaper) -> Trajectory:
@@ -122,6 +125,9 @@ def shaped(trajectory: Trajectory, by: Shaper) -> Trajectory:
 
     Positions, speeds and accelerations keep every bound that those of the motion keep.
     """
+    if by.factors:
+        # Each mode has two or three parts, all of them together have hundreds.
+        return reduce(shaped, by.factors, trajectory)
     breaks = np.unique(np.add.outer(by.delays, trajectory.times))
     times = breaks[np.append(True, np.diff(breaks) > _INSTANT)]
     times[-1] = breaks[-1]
