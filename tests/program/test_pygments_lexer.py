@@ -242,6 +242,9 @@ BEGIN
   TIMER t ON ; LOG "a" (n) ; PULSE v FOR 3 ; RAISE jam WITH "x" ;
   MOVE ARM_1 TO f CIRCULARLY, VIA (b), WITH VELOCITY = 3, WITH TRACKING = belt ;
   MOVE ARM_1 TO f SMOOTHLY ; MOVE ARM_1 TO f STRAIGHTLY, SMOOTHLY, WITH SPEED = 3 ;
+  MOVE ARM_1 TO f SMOOTHLY,
+       WITH SPEED = 3,
+       WITH APPROACH = g ;
   WAIT UNTIL x WITHIN 3 ELSE HALT ;
 END.
 """
@@ -249,11 +252,11 @@ END.
     assert words == [
         *("CONST", "RECORD", "TEXT", "FUNCTION", "IN", "INOUT", "BOOLEAN", "RETURN", "WHEN", "BRAKE", "RESUME"),
         *("WHEN", "BRAKE", "TIMER", "LOG", "PULSE", "RAISE", "CIRCULARLY", "VELOCITY", "TRACKING"),
-        *("SMOOTHLY", "SMOOTHLY", "WITHIN"),
+        *("SMOOTHLY", "SMOOTHLY", "SMOOTHLY", "WITHIN"),
     ]
     for word in sorted(WORDS_IN_CONTEXT | {"MODULE", "AS"}):
         uses = (
-            f"VAR a, {word} : SCALAR ;\nBEGIN\n  {word} = 1 ;\n  a = {word} ;\n  a = 2 * {word} + {word} ;\n"
+            f"VAR a,\n    {word},\n    b, {word} : SCALAR ;\nBEGIN\n  {word} = 1 ;\n  a = {word} ;\n  a = 2 * {word} + {word} ;\n"
             f"  IF {word} > 1 AND {word} = 3 THEN {word} = 2 ELSE a = {word} ;\n  WHILE a < {word} DO {word}(a) ;\n"
             f"  PRINT({word}, {word}[2], a, {word}) ;\n  MOVE ARM_1 TO {word} ;\n  LOCK ({word}) DO SIGNAL {word} ;\n"
             f"  PAUSE {word} ; WAIT {word} ; FOR {word} = {word} TO {word} STEP {word} DO ;\nEND.\n"

@@ -62,7 +62,7 @@ def _not_behind(words: Iterable[str]) -> str:
 # Where an adverb follows a name, and where nothing but another clause, or the end, follows it.
 _ADVERBS = ("DIRECTLY", "STRAIGHTLY", *PLAIN_CLAUSES_IN_CONTEXT)
 _BEHIND_NAME = rf"(?<=[A-Z0-9_] ){_not_behind((_VOCABULARY.reserved | WORDS_IN_CONTEXT) - set(_ADVERBS))}"
-_BEFORE_CLAUSE = rf"(?:{_AT_END}|(?=,?[ \t]+(?:WITH|ON|VIA|{'|'.join(_ADVERBS)})(?!\w)))"
+_BEFORE_CLAUSE = rf"(?:{_AT_END}|(?=,[ \t]*(?:[\r\n]|$)|,?[ \t]+(?:WITH|ON|VIA|{'|'.join(_ADVERBS)})(?!\w)))"
 # Clauses of queues and of corrected paths.
 _MORE_CLAUSES = ("BOUND", "CAPACITY", "CORRECTION", "RATE")
 # Words that programs may use as names, where what is around them tells that they are words of the language: the kind
