@@ -256,7 +256,8 @@ END.
     ]
     for word in sorted(WORDS_IN_CONTEXT | {"MODULE", "AS"}):
         uses = (
-            f"VAR a,\n    {word},\n    b, {word} : SCALAR ;\nBEGIN\n  {word} = 1 ;\n  a = {word} ;\n  a = 2 * {word} + {word} ;\n"
+            f"VAR a,\n    {word},\n    b, {word} : SCALAR ;\nBEGIN\n"
+            f"  {word} = 1 ;\n  a = {word} ;\n  a = 2 * {word} + {word} ;\n"
             f"  IF {word} > 1 AND {word} = 3 THEN {word} = 2 ELSE a = {word} ;\n  WHILE a < {word} DO {word}(a) ;\n"
             f"  PRINT({word}, {word}[2], a, {word}) ;\n  MOVE ARM_1 TO {word} ;\n  LOCK ({word}) DO SIGNAL {word} ;\n"
             f"  PAUSE {word} ; WAIT {word} ; FOR {word} = {word} TO {word} STEP {word} DO ;\nEND.\n"
