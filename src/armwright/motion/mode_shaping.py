@@ -18,6 +18,8 @@ from armwright.motion.trajectory import Trajectory
 Smoothing: TypeAlias = Literal[ShaperKind, "flat"]
 # Configurations at which frequencies are computed.
 _MEAN = 101
+# A mode that is damped more swings past its place by 0.15 % at most, in periods that grow without bound.
+_SWINGS = 0.9
 # A shaper, or flat feedforward, adds so much at most [s].
 LONGEST = 60.0
 
@@ -94,8 +96,7 @@ def mode_shaper(arm: Arm, planned: Trajectory, kind: ShaperKind, *, count: int, 
     """
     found = modes(arm, planned(np.linspace(0, planned.duration, _MEAN)))
     frequencies, damping = found.frequencies.mean(axis=0), found.damping.mean(axis=0)
-    # What is damped more creeps to its place.
-    slowest = np.flatnonzero(damping < 1)[: integer(count, "count", least=1)]
+    slowest = np.flatnonzero(damping < _SWINGS)[: integer(count, "count", least=1)]
     pairs = zip(frequencies[slowest].tolist(), damping[slowest].tolist(), strict=True)
     by = combined([shaper(kind, f, z, tolerance=tolerance) for f, z in pairs])
     if by.duration > LONGEST:
