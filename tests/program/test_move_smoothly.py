@@ -191,6 +191,16 @@ def test_line() -> None:
     assert data["shaping"]["path_deviation"] == pytest.approx(certificate.deviation, abs=1e-9)
 
 
+@pytest.mark.parametrize("way", ["XYZ(0, 100, 20) * ROTZ(180)", "XYZ(0, 0.0001, 0)", "XYZ(0, 0.0001, 0) * ROTZ(0.1)"])
+def test_certain_lines(way: str) -> None:
+    """A half turn is one the way that the tool goes, and a line of less than a micrometre is a line."""
+    (stage,) = ran(f"MOVE ARM_1 TO f * {way} STRAIGHTLY, SMOOTHLY, WITH SPEED = 60 ;").stages
+
+    assert stage.stage.certificate is not None
+    assert stage.stage.certificate.holds
+    assert stage.stage.shaping is not None
+
+
 def test_every_stage() -> None:
     """With APPROACH and DEPARTURE each of the three stages is shaped for itself, and ends at rest."""
     recording = ran(
@@ -260,6 +270,7 @@ def test_what_cannot_be_done(text: str, code: str, says: str) -> None:
 
     assert error.code == code
     assert says in " ".join((error.message, error.label, *error.notes))
+    assert any("leave STRAIGHTLY out" in advice for advice in error.helps) == ("only turns" in says)
 
 
 def test_rigid_and_coupled_arms() -> None:

@@ -34,6 +34,8 @@ _SAMPLES = (4, 200)
 _LEG_SAMPLES, _MAX_LEG_SAMPLES, _LEG_ADDED = 8, 128, 0.1
 # A distance below this is not sampled more closely [m].
 _SMALL = 1e-9
+# A turn that may be a half one, the other way round too [rad].
+_HALF_TURN = np.pi - 1e-6
 # Of the distance of any polynomials from a line: samples are so dense that they miss no more than this [m], [rad], but
 # there are no more than so many on an interval.
 _LINE_MISSED, _MAX_LINE_SAMPLES = 1e-6, 1000
@@ -469,6 +471,11 @@ def distance_from_line(arm: AnyArm, trajectory: Trajectory, A: Array, B: Array) 
     length = float(np.linalg.norm(shift))
     turn = rotation_vector(A[:3, :3].T @ B[:3, :3])
     angle = float(np.linalg.norm(turn))
+    if angle > _HALF_TURN:
+        # It is as far the other way round; the motion tells which way it goes.
+        middle = np.asarray(solver.forward(trajectory(trajectory.duration / 2)[None]))[0]
+        if rotation_vector(A[:3, :3].T @ middle[:3, :3]) @ turn < 0:
+            turn, angle = turn * (1 - 2 * np.pi / angle), 2 * np.pi - angle
     per_metre = angle / length if length > _SMALL else 0.0
     bend = half_angle_bound(
         tool.angular_speed, tool.angular_acceleration, per_metre * tool.acceleration, per_metre * speed

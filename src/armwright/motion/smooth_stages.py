@@ -20,7 +20,7 @@ from armwright.dynamics.flexible_joints import links_at_rest
 from armwright.errors import ArmwrightError, IncapableArmError, InvalidValueError
 from armwright.motion.certificate import BindingLimit, slower
 from armwright.motion.certified_motion import certificate_of
-from armwright.motion.deviation import distance_from_line, path_deviation
+from armwright.motion.deviation import distance_from_line, half_sines, path_deviation
 from armwright.motion.flat_feedforward import FlatMotion, flat_motion, ninth
 from armwright.motion.limit_utilization import ROUNDING, slowing_for_limits
 from armwright.motion.mode_shaping import LONGEST, ModeShaping, StageShaping, mode_shaper
@@ -35,7 +35,7 @@ from armwright.motion.trajectory import Trajectory
 _ROUNDS, _MORE = 30, 1e-3
 # What a number of servo periods may be off a whole one.
 _TICK = 1e-6
-# A line that is shorter only turns the tool [m].
+# A line that is shorter only turns the tool, if it turns it [m].
 _TURN = 1e-6
 
 
@@ -44,11 +44,12 @@ class LeftLineError(ArmwrightError, ValueError):
 
     Attributes:
         stage: which stage, from 0.
+        only_turns: whether the tool only turns on it, which no slower motion changes.
     """
 
-    def __init__(self, stage: int, text: str) -> None:
+    def __init__(self, stage: int, text: str, *, only_turns: bool = False) -> None:
         """Keep the stage."""
-        self.stage = stage
+        self.stage, self.only_turns = stage, only_turns
         super().__init__(text)
 
 
@@ -228,9 +229,12 @@ def _certified(
         away, length = path_deviation(arm, planned.trajectory, motion), tool_path_length(arm, motion)
     if planned.kind == "LINE":
         start, end = (solver_of(arm).forward(planned.trajectory(t)) for t in (0.0, planned.trajectory.duration))
-        if np.linalg.norm(end[:3, 3] - start[:3, 3]) < _TURN:
-            raise LeftLineError(number, "on this line the tool only turns, and the path of a turn is not certified")
-        error, allowed = distance_from_line(arm, motion, start, end), tolerance(deviation)
+        allowed = tolerance(deviation)
+        turn = 2 * math.asin(min(1.0, float(half_sines(start[:3, :3], end[:3, :3]))))
+        if np.linalg.norm(end[:3, 3] - start[:3, 3]) < _TURN and turn > allowed.orientation:
+            text = "on this line the tool only turns, and the path of a turn is not certified"
+            raise LeftLineError(number, text, only_turns=True)
+        error = distance_from_line(arm, motion, start, end)
         found = error.largest
         # Running back along the line is leaving it too.
         off = max(found.position, error.backward or 0.0)

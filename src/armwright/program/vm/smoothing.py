@@ -65,6 +65,8 @@ def smoothed_stages(
             "a slower MOVE keeps nearer to the line: write a lower SPEED or VELOCITY",
             "the cell file may allow more by `deviation_mm` of [motion], or shape less by `shaper` and `modes`",
         ]
+        if error.only_turns:
+            helps = ["leave STRAIGHTLY out, or SMOOTHLY"]
         raise machine.error(process, "E413", text, span, "asked for here", notes=[str(error)], helps=helps) from None
     except (UnsupportedArmError, InvalidValueError, IncapableArmError) as error:
         text = f"{arm} cannot make this MOVE smoothly: {error}"
