@@ -3,12 +3,13 @@
 import re
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import attrs
 import pytest
 
 from armwright.cell import read_cell
-from armwright.cell.reader import DETOURS
+from armwright.cell.reader import DETOURS, parse_cell
 from armwright.export import ExportError, export_run
 from armwright.program import Recording, Source, run
 from export.cases import CELLS, ROOT
@@ -125,6 +126,18 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], R
         return run(Source("construct.rlo", f"{DECLARED}{PROGRAMS[construct]}\nEND."), read_cell(path))
 
     return lambda target, construct: in_cell(target if target in CELLS else "urscript", construct)
+
+
+def test_streams_of_whole_periods() -> None:
+    """A motion of a whole number of periods, but for rounding, is streamed in so many."""
+    counted = 0
+    for seconds in (0.84, 0.968, 0.976):
+        motion = f"{DECLARED}MOVE ARM_1 TO b SMOOTHLY, WITH DURATION = {seconds:.3f} ;\nEND."
+        recording = run(Source("stream.rlo", motion), parse_cell(Path("urscript.toml"), cell_text("urscript")))
+        counted += recording.stages[-1].motion.duration > round(seconds / 0.008) * 0.008
+        script = export_run("urscript", recording, "stream").files["stream.script"]
+        assert script.count("servoj(") == round(seconds / 0.008)
+    assert counted
 
 
 def test_the_table_is_whole() -> None:

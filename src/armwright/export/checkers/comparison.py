@@ -38,6 +38,8 @@ from armwright.motion.plan import StageGoal
 
 # What is allowed: micrometres of targets, of angles, of waiting times; a part of a speed limit that rounding takes.
 _PLACE_MM, _ANGLE, _TIME, _ROUNDING = 1e-3, 1e-5, 1e-4, 1e-3
+# A stream that ends so much earlier has ended with the plan [s].
+_STREAM_END = 1e-6
 # Steps along a line: no longer, no larger turn, and so many at most.
 _STEP, _TURN, _MOST_STEPS, _FEWEST_STEPS = 0.02, 0.1, 64, 6
 # Newton steps to a pose on a line, and what is near enough [m, rad].
@@ -354,7 +356,7 @@ class Comparing:
     def _is_last(self, taken: Sequence[JointAction], statement: MoveKnots) -> bool:
         """Whether all actions of knots have been taken: a stream lasts as long as the plan, others pass all knots."""
         if taken[0].streamed:
-            return sum(action.duration or 0.0 for action in taken) >= statement.stage.motion.duration - _TIME
+            return sum(action.duration or 0.0 for action in taken) >= statement.stage.motion.duration - _STREAM_END
         return len(taken) >= len(statement.times)
 
     def _between(self, ends: Sequence[Array], statement: MoveKnots, line: int) -> None:

@@ -30,6 +30,8 @@ NAME_LIMIT = 64
 # The slowest that a line is written with [m/s], [m/s²].
 LEAST_SPEED = 1e-4
 _STREAM_PERIOD = 0.008
+# What a number of these periods may be off a whole one.
+_ROUNDING = 1e-6
 # How the arm comes to where the program begins, from wherever it is [rad/s], [rad/s²].
 TO_START = 0.2
 # What would end a text, or change the meaning of what follows.
@@ -67,7 +69,7 @@ def _lines(statement: Statement, program: ControllerProgram) -> Iterator[str]:
             yield from _straight(statement, program)
         case MoveKnots(stage=stage):
             period = program.mapped.convention.stream_period or _STREAM_PERIOD
-            count = math.ceil(stage.motion.duration / period)
+            count = math.ceil(stage.motion.duration / period - _ROUNDING)
             positions = program.mapped.joints(stage.motion(np.linspace(0.0, stage.motion.duration, count + 1)[1:]))
             following = f"t={period:g}, lookahead_time=0.03, gain=500)"
             for q in positions:
