@@ -261,6 +261,7 @@ def test_random_moves(sample: Sample) -> None:
         ("MOVE ARM_1 TO f * ROTZ(30) STRAIGHTLY, SMOOTHLY ;", "E413", "the tool only turns"),
         ("MOVE ARM_1 TO g SMOOTHLY, WITH DURATION = 0.3 ;", "E405", "shaped, it takes"),
         ("MOVE ARM_1 TO g * XYZ(3000, 0, 0) SMOOTHLY ;", "E401", "cannot be reached"),
+        ("MOVE ARM_1 TO f * XYZ(-750, 0, 0) STRAIGHTLY, SMOOTHLY ;", "E401", "has no detours; go there by other"),
     ],
 )
 def test_what_cannot_be_done(text: str, code: str, says: str) -> None:
@@ -269,7 +270,7 @@ def test_what_cannot_be_done(text: str, code: str, says: str) -> None:
     error = failure(f"{DECLARED} {text} END.", soft).diagnostic
 
     assert error.code == code
-    assert says in " ".join((error.message, error.label, *error.notes))
+    assert says in " ".join((error.message, error.label, *error.notes, *error.helps))
     assert any("leave STRAIGHTLY out" in advice for advice in error.helps) == ("only turns" in says)
 
 

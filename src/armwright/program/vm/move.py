@@ -329,8 +329,7 @@ def _plan_stages(
         speed=request.speed,
         deviation=cell.deviation,
         period=cell.period,
-        # A straight line is corrected and shaped, and not a detour.
-        around=None if request.correction is not None or request.form.smooth else cell.around,
+        around=cell.around if _has_detours(request) else None,
         tool=request.tool,
     )
     try:
@@ -426,6 +425,11 @@ def _retime_stage(stage: PlannedStage, slow: Trajectory, *, longer: bool) -> Pla
     return attrs.evolve(stage, trajectory=slow, slowed=slowed, certificate=certificate, unmet=unmet)
 
 
+def _has_detours(request: MoveRequest) -> bool:
+    """Whether straight lines of a MOVE may be bypassed: they are corrected and shaped, and detours are not."""
+    return request.correction is None and not request.form.smooth
+
+
 def _fail_move(
     machine: Machine, process: Process, obstacle: Obstacle, *, request: MoveRequest, stage: StagePlan, arm: str
 ) -> NoReturn:
@@ -444,7 +448,7 @@ def _fail_move(
         notes=(obstacle_location(obstacle, kind, stage.frames, arm),),
         helps=(
             *(_unit_advice(machine, process, goal, arm) if is_frame else ()),
-            *detour_advice(obstacle, kind, machine.cell.around),
+            *detour_advice(obstacle, kind, machine.cell.around, bypassed=_has_detours(request)),
         ),
     )
 

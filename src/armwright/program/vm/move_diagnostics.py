@@ -64,16 +64,19 @@ def obstacle_location(obstacle: Obstacle, kind: str, goal_names: Sequence[str], 
     return f"{part}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, at {position}: {obstacle.reason}"
 
 
-def detour_advice(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, ...]:
+def detour_advice(obstacle: Obstacle, kind: str, around: str | None, *, bypassed: bool = True) -> tuple[str, ...]:
     """Return advice for a path that is stopped: how to search for a detour, or that there is none.
 
     Args:
         obstacle: what stops the stage.
         kind: of the stage: ``PTP``, ``LINE``, ``SPLINE``, ``BLEND`` or ``ARC``.
         around: method by which a detour was searched for; None where none was.
+        bypassed: whether lines of this MOVE have detours.
     """
     if obstacle.certain or kind == "PTP":
         return ()
+    if not bypassed:
+        return ("a line that is shaped or corrected has no detours; go there by other frames",)
     if kind in _THROUGH_FRAMES:
         advice = "another VIA, or straight moves from frame to frame"
         return (f"`--around` has no detours for a path through several frames; try {advice}",)
