@@ -1,7 +1,8 @@
 """What is known of the clearances and wear coefficients of pins: samples, updated by what a check measures.
 
-Between checks clearances grow after the table, and scatter about it as sums of independent grains do. At a check the
-samples are described by a normal distribution of clearances and logarithms of wear coefficients; the posterior is
+A clearance is that of the new pin and its growth. Between checks growths follow the table, and scatter about it as sums
+of independent grains do. At a check the samples are described by a normal distribution of new clearances, growths and
+logarithms of wear coefficients; the posterior is
 found by importance sampling about its mode, so that neither a wide prior nor an accurate reading leaves few samples.
 
 Source:
@@ -11,6 +12,7 @@ Source:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import attrs
@@ -18,7 +20,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from armwright.arrays import Array, Numbers, integer, not_negative, positive
-from armwright.clearance.maintenance.maintained_linkage import GrowthTable
+from armwright.clearance.maintenance.wear_history import GrowthTable
 from armwright.errors import InvalidValueError, ShapeError
 
 # No pin has less [m].
@@ -107,15 +109,15 @@ class WearPrior:
 
 
 class Measured(NamedTuple):
-    """What a check says of the clearances: values = design · c + normal errors.
+    """What a check says of the pins: values that were predicted, with normal errors.
 
     Attributes:
-        design: (k, p).
+        predicted: (..., k) values for new clearances (..., p) and growths (..., p) [m].
         values: (k,) [m].
         covariance: (k, k) of their errors [m²].
     """
 
-    design: Array
+    predicted: Callable[[Array, Array], Array]
     values: Array
     covariance: Array
 
@@ -128,7 +130,8 @@ class Belief:
         prior: of new pins.
         table: growth of the clearances.
         strokes: done.
-        clearances: (s, p) [m].
+        new: (s, p) clearances of the new pins [m].
+        growths: (s, p) of the clearances since [m].
         logs: (s, p) natural logarithms of the wear coefficients [m²/N].
         misfit: sum of the squares by which the last check and what was believed before disagree at least, in standard
             deviations; it follows chi-square with as many degrees of freedom as values were measured.
@@ -137,33 +140,43 @@ class Belief:
     prior: WearPrior
     table: GrowthTable
     strokes: float
-    clearances: Array
+    new: Array
+    growths: Array
     logs: Array
     misfit: float = 0.0
 
     @classmethod
-    def new(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
+    def of_new_pins(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
         """Return what is known of new pins."""
         if not _FEWEST <= integer(samples, "samples", least=1) <= _MOST:
             raise InvalidValueError(f"samples: expected {_FEWEST} to {_MOST}, got {samples}")
-        clearances, logs = prior.draw(rng, samples)
-        return cls(prior=prior, table=table, strokes=0.0, clearances=clearances, logs=logs)
+        new, logs = prior.draw(rng, samples)
+        return cls(prior=prior, table=table, strokes=0.0, new=new, growths=np.zeros_like(new), logs=logs)
 
-    def forecast(self, strokes: Array, noise: Array) -> Array:
-        """Return (n, s, p) clearances after as many strokes (n,) altogether.
+    @property
+    def clearances(self) -> Array:
+        """(s, p) [m]."""
+        return self.new + self.growths
+
+    def growths_after(self, strokes: Array, noise: Array) -> Array:
+        """Return (n, s, p) growths of the clearances after as many strokes (n,) altogether [m].
 
         Args:
             strokes: none before those already done.
             noise: (s, p) standard normal numbers, of the scatter of the growth [1].
         """
         exposure = (strokes[:, None, None] - self.strokes) * np.exp(self.logs)
-        mean = self.table.grown(self.clearances, exposure)
-        return np.maximum(mean + self.prior.growth_deviation(mean - self.clearances) * noise, _LEAST_CLEARANCE)
+        mean = self.table.grown(self.growths, exposure)
+        return np.maximum(mean + self.prior.growth_deviation(mean - self.growths) * noise, 0.0)
+
+    def forecast(self, strokes: Array, noise: Array) -> Array:
+        """Return (n, s, p) clearances after as many strokes (n,) altogether [m]; see ``growths_after``."""
+        return self.new + self.growths_after(strokes, noise)
 
     def at(self, strokes: float, rng: np.random.Generator) -> Belief:
         """Return what is known after more strokes, without a measurement."""
         noise = rng.standard_normal(self.clearances.shape)
-        return attrs.evolve(self, strokes=strokes, clearances=self.forecast(np.array([strokes]), noise)[0])
+        return attrs.evolve(self, strokes=strokes, growths=self.growths_after(np.array([strokes]), noise)[0])
 
     def updated(self, strokes: float, measured: Measured, rng: np.random.Generator) -> Belief:
         """Return what is known after a check.
@@ -180,23 +193,26 @@ class Belief:
 
         if strokes < self.strokes:
             raise InvalidValueError(f"strokes: expected at least {self.strokes:g}, got {strokes:g}")
-        state = np.concatenate([self.clearances, self.logs], axis=-1)
-        p, (count, size) = self.clearances.shape[1], state.shape
+        state = np.concatenate([self.new, self.growths, self.logs], axis=-1)
+        p, (count, size) = self.new.shape[1], state.shape
         mean, factor = state.mean(axis=0), _root(np.cov(state, rowvar=False))
         try:
             whiten = np.linalg.inv(np.linalg.cholesky(measured.covariance))
         except np.linalg.LinAlgError:
             raise InvalidValueError("measured: expected a positive definite covariance") from None
 
-        def states(u: Array) -> tuple[Array, Array]:
-            """Return clearances now and logarithms, for rows of independent standard normal numbers (..., 3 p)."""
+        def states(u: Array) -> tuple[Array, Array, Array]:
+            """Return new clearances, growths now and logarithms, for rows of standard normal numbers (..., 4 p)."""
             before = mean + u[..., :size] @ factor.T
-            c, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., p:]
-            grown = self.table.grown(c, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
-            return grown + self.prior.growth_deviation(grown - c) * u[..., size:], logs
+            new, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., 2 * p :]
+            growths = np.maximum(before[..., p : 2 * p], 0.0)
+            grown = self.table.grown(growths, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
+            now = np.maximum(grown + self.prior.growth_deviation(grown - growths) * u[..., size:], 0.0)
+            return new, now, logs
 
         def residuals(u: Array) -> Array:
-            misfit = measured.values - states(u)[0] @ measured.design.T
+            new, growths, _ = states(u)
+            misfit = measured.values - measured.predicted(new, growths)
             return np.concatenate([u, misfit @ whiten.T], axis=-1)
 
         found = least_squares(residuals, np.zeros(size + p), method="lm", diff_step=1e-6)
@@ -209,17 +225,16 @@ class Belief:
         weights = -0.5 * (residuals(u) ** 2).sum(axis=-1) - proposed
         weights = np.exp(weights - weights.max())
         u = u[_systematic_sample(weights, rng)]
-        clearances, logs = states(u)
-        clearances = np.maximum(clearances, _LEAST_CLEARANCE)
-        return attrs.evolve(
-            self, strokes=strokes, clearances=clearances, logs=logs, misfit=float(found.fun @ found.fun)
-        )
+        new, growths, logs = states(u)
+        misfit = float(found.fun @ found.fun)
+        return attrs.evolve(self, strokes=strokes, new=new, growths=growths, logs=logs, misfit=misfit)
 
     def with_new_bearing(self, pin: int, rng: np.random.Generator) -> Belief:
         """Return what is known after a bearing was changed."""
-        clearances, logs = self.clearances.copy(), self.logs.copy()
-        clearances[:, pin], logs[:, pin] = self.prior.new_bearing(pin, self.logs, rng)
-        return attrs.evolve(self, clearances=clearances, logs=logs)
+        new, growths, logs = self.new.copy(), self.growths.copy(), self.logs.copy()
+        new[:, pin], logs[:, pin] = self.prior.new_bearing(pin, self.logs, rng)
+        growths[:, pin] = 0.0
+        return attrs.evolve(self, new=new, growths=growths, logs=logs)
 
     def interval(self, level: float = 0.9) -> tuple[Array, Array]:
         """Return (2, p) the bounds between which clearances [m] and wear coefficients [m²/N] lie with a probability."""
