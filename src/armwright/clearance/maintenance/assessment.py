@@ -14,7 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array, finite_or_none, integer, not_negative
 from armwright.clearance.estimation.misfit import CONTRADICTION, p_value
-from armwright.clearance.maintenance.belief import Belief, WearPrior
+from armwright.clearance.maintenance.belief import FEWEST_SAMPLES, Belief, WearPrior
 from armwright.clearance.maintenance.check_file import PastCheck
 from armwright.clearance.maintenance.comparison import Maintained, compare_ways, standard_error
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
@@ -24,6 +24,8 @@ from armwright.files.result_table import ResultTable
 
 # Corrections that are printed; the others are in the files.
 _SHOWN = 12
+# Simulated lives are many, and their next checks may scatter more.
+_FEWER = 30
 _LEVEL = 0.9
 
 
@@ -306,7 +308,7 @@ def plan_checks(
     strokes: float | None = None,
     strokes_per_day: float | None = None,
     lives: int = 20,
-    samples: int = 1000,
+    samples: int = 30_000,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> CheckPlan:
@@ -321,7 +323,7 @@ def plan_checks(
         strokes: done until now; those of the last check or change when left out.
         strokes_per_day: for the notes.
         lives: simulated, of each way of maintenance.
-        samples: of the filter.
+        samples: of the filter; that of a simulated life has a thirtieth.
         seed: of all random numbers.
         progress: called with the number of simulated hundredths, and of all.
 
@@ -350,7 +352,9 @@ def plan_checks(
             f"strokes, with all corrections and changes; expected {strategy.soonest:.3g} or more, a tenth of the least "
             f"interval"
         )
-    planned, *fixed = compare_ways(planner, history[-1], lives, seed, progress)
+    few = max(samples // _FEWER, FEWEST_SAMPLES)
+    start = history[-1].thinned(few, rng)
+    planned, *fixed = compare_ways(Planner.of(machine, strategy, few, seed), start, lives, seed, progress)
     return CheckPlan(
         planner=planner,
         history=[Known.of(known) for known in history],

@@ -27,7 +27,7 @@ from armwright.errors import InvalidValueError, ShapeError
 _LEAST_CLEARANCE = 1e-7
 # Degrees of freedom of the proposal: its tails are wider than those of the posterior.
 _TAILS = 6.0
-_FEWEST, _MOST = 100, 100_000
+FEWEST_SAMPLES, _MOST = 100, 100_000
 # A logarithm within which no wear coefficient is bounded by rounding.
 _WIDEST = 5.0
 
@@ -148,8 +148,8 @@ class Belief:
     @classmethod
     def of_new_pins(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
         """Return what is known of new pins."""
-        if not _FEWEST <= integer(samples, "samples", least=1) <= _MOST:
-            raise InvalidValueError(f"samples: expected {_FEWEST} to {_MOST}, got {samples}")
+        if not FEWEST_SAMPLES <= integer(samples, "samples", least=1) <= _MOST:
+            raise InvalidValueError(f"samples: expected {FEWEST_SAMPLES} to {_MOST}, got {samples}")
         new, logs = prior.draw(rng, samples)
         return cls(prior=prior, table=table, strokes=0.0, new=new, growths=np.zeros_like(new), logs=logs)
 
@@ -177,6 +177,11 @@ class Belief:
         """Return what is known after more strokes, without a measurement."""
         noise = rng.standard_normal(self.clearances.shape)
         return attrs.evolve(self, strokes=strokes, growths=self.growths_after(np.array([strokes]), noise)[0])
+
+    def thinned(self, samples: int, rng: np.random.Generator) -> Belief:
+        """Return what is known with fewer samples, drawn from these."""
+        rows = rng.choice(len(self.new), samples, replace=False)
+        return attrs.evolve(self, new=self.new[rows], growths=self.growths[rows], logs=self.logs[rows])
 
     def updated(self, strokes: float, measured: Measured, rng: np.random.Generator) -> Belief:
         """Return what is known after a check.
