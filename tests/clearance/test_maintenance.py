@@ -144,7 +144,8 @@ def test_next_check_of_one_lognormal_rate(machine: MaintainedLinkage) -> None:
     """Without a correction that helps, a check is due at the quantile of the lognormal rate that alpha asks for."""
     # One correction only, for the first clearances: what grows after is the error.
     first = machine.watched.along * 1e-4
-    shifts = WornShifts(np.array([[0.0] * 3, [1e-4] * 3]), np.array([first, 2 * first]), np.zeros((2, *first.shape)))
+    along, by_clearance = np.array([first, 2 * first]), np.array([first, first]) / 1e-4
+    shifts = WornShifts(np.array([[0.0] * 3, [1e-4] * 3]), along, by_clearance, np.zeros_like(along))
     quiet = attrs.evolve(
         machine,
         history=attrs.evolve(machine.history, table=steady(pins=3)),
@@ -197,7 +198,13 @@ def test_readings_tell_the_growths(machine: MaintainedLinkage) -> None:
 
     for believed, tolerance in ((growths, 5e-7), (0.9 * growths, 5e-6)):
         (check,) = read_offsets(
-            machine.linkage, poses, machine.pose_gaps, offsets[None], np.full(3, 5.0), 1e-5, (new[None], believed[None])
+            machine.linkage,
+            poses,
+            machine.pose_gaps,
+            offsets[None],
+            np.full(3, 5.0),
+            1e-5,
+            (new[None], believed[None, None]),
         )
         np.testing.assert_allclose(check.predicted(new, growths), check.values, atol=tolerance)
 
@@ -297,7 +304,7 @@ def test_check_that_nobody_expected(machine: MaintainedLinkage) -> None:
 def test_limit_that_no_plan_keeps(machine: MaintainedLinkage) -> None:
     """Where new bearings alone scatter beyond the limit, no check could help, and the plan says so."""
     with pytest.raises(InvalidValueError, match=r"limit: 0.1 mm cannot be kept: a check would be due after 0 strokes"):
-        plan_checks(machine, prior(clearance_spread=2e-4), strategy())
+        plan_checks(machine, prior(clearance_spread=2e-4), strategy(), samples=2000)
 
 
 def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
@@ -308,7 +315,7 @@ def test_file_of_clearances(machine: MaintainedLinkage, tmp_path: Path) -> None:
     first, second = read_checks(file, machine.linkage)
 
     assert (first.strokes, second.strokes) == (2e6, 4e6)
-    check = first.measured(machine, 1e-5, (np.full(3, 1e-4), np.zeros(3)))
+    check = first.measured(machine, 1e-5, (np.full(3, 1e-4), np.zeros((1, 3))))
     np.testing.assert_array_equal(check.predicted(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 0.3])), [1.1, 3.3])
     np.testing.assert_allclose(check.values, (1.6e-4, 1.7e-4))
     np.testing.assert_allclose(check.covariance, np.diag([16e-12, 25e-12]))

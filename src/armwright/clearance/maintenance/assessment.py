@@ -401,8 +401,7 @@ def learn(
         if isinstance(event, str):
             history.append(before.with_new_bearing(names.index(event), rng))
         else:
-            believed = before.new.mean(axis=0), before.growths.mean(axis=0)
-            measured = event.measured(machine, planner.strategy.noise, believed)
+            measured = event.measured(machine, planner.strategy.noise, (before.new.mean(axis=0), before.growths))
             history.append(history[-1].updated(moment, measured, rng))
             _refuse_surprise(history[-1], len(measured.values))
     return history

@@ -65,7 +65,7 @@ class RestCheck:
         Args:
             machine: that was measured.
             noise: standard deviation of one coordinate of a reading [m].
-            believed: (p,) mean clearances of the new pins before, and (p,) their mean growths [m].
+            believed: (p,) mean clearances of the new pins before, and (s, p) samples of their growths [m].
 
         Raises:
             InvalidValueError: a pose cannot be reached, or a pin carries no force there.

@@ -84,8 +84,9 @@ class MaintainedLinkage:
             new: (p,) mean clearances of the new pins [m].
             growths: (..., p) mean growths of these [m].
         """
-        more = self.watched.along @ (new - self.linkage.clearance_array(None))
-        return np.asarray((self.aim @ (more + self.shifts.at(growths)[0].sum(axis=-1))[..., None])[..., 0])
+        along, by_clearance, _ = self.shifts.at(growths)
+        shift = along.sum(axis=-1) + by_clearance @ (new - self.linkage.clearance_array(None))
+        return np.asarray((self.aim @ shift[..., None])[..., 0])
 
     def moves(self, taken: Array) -> Array:
         """Return (..., m, 2) how a correction moves the commanded tip [m], or (..., m, 1) the single drive [rad, m].

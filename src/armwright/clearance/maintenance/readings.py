@@ -14,6 +14,9 @@ from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Measured
 from armwright.clearance.maintenance.wear_history import Places, WornGaps, WornShifts
 
+# How far friction moves a journal depends much on its worn wall: the mean is over so many samples.
+_FRICTION_SAMPLES = 50
+
 
 def read_offsets(  # noqa: PLR0917 - what a check consists of
     linkage: Linkage,
@@ -36,20 +39,23 @@ def read_offsets(  # noqa: PLR0917 - what a check consists of
         offsets: (n, k, 2) of the tip, means of the readings [m].
         readings: (k,) numbers of readings.
         noise: standard deviation of a coordinate of one reading [m].
-        believed: (n, p) mean clearances of the new pins before, and (n, p) their mean growths [m].
+        believed: (n, p) mean clearances of the new pins before, and (n, s, p) samples of their growths [m].
     """
     count, shifts = len(poses.q), gaps.shifts(poses)
-    new, growths = believed
-    tips = tips_of(linkage, poses.q, gaps.at(new, growths, np.zeros((1, len(new), *poses.q.shape[:1], new.shape[1]))))
-    across = shifts.at(growths)[1]
+    new, samples = believed
+    growths = samples.mean(axis=1)
+    tilts = np.array([-1.0, 0.0, 0.0, 1.0])[:, None, None, None]
+    resting = gaps.at(new, growths, np.broadcast_to(tilts, (4, len(new), count, new.shape[1]))).mean(axis=0)
+    tips = tips_of(linkage, poses.q, resting)
+    across = shifts.at(samples[:, :_FRICTION_SAMPLES])[2]
     # Even chances between -1 and 1 have the variance of a third.
-    friction = np.einsum("nkip,nkjp->nkij", across, across) / 3
+    friction = np.einsum("nskip,nskjp->nkij", across, across) / (3 * across.shape[1])
     rows = []
-    for offset, tip, error, *mean in zip(offsets, tips[0] - poses.tip, friction, new, growths, strict=True):
+    for offset, tip, error, *mean in zip(offsets, tips - poses.tip, friction, new, growths, strict=True):
         covariance = np.zeros((count, 2, count, 2))
         for k in range(count):
             covariance[k, :, k] = (error[k] + noise**2 * np.eye(2)) / readings[k]
-        linear = _Linear(poses, gaps.clearances, shifts)
+        linear = _Linear(gaps.clearances, shifts)
         rows.append(
             Measured(
                 predicted=linear,
@@ -68,11 +74,11 @@ def tips_of(linkage: Linkage, q: Array, gaps: Array) -> Array:
 class _Linear:
     """Offsets of the tip at poses, as the sum of those by each pin."""
 
-    def __init__(self, poses: Places, clearances: Array, shifts: WornShifts) -> None:
-        self._poses, self._clearances, self._shifts = poses, clearances, shifts
+    def __init__(self, clearances: Array, shifts: WornShifts) -> None:
+        self._clearances, self._shifts = clearances, shifts
 
     def __call__(self, new: Array, growths: Array) -> Array:
         """Return (..., 2 k) offsets [m]."""
-        more = np.einsum("kip,...p->...ki", self._poses.along, new - self._clearances)
-        offsets = more + self._shifts.at(growths)[0].sum(axis=-1)
+        along, by_clearance, _ = self._shifts.at(growths)
+        offsets = (along + by_clearance * (new - self._clearances)[..., None, None, :]).sum(axis=-1)
         return np.asarray(offsets.reshape(*offsets.shape[:-2], -1))

@@ -257,7 +257,7 @@ def _check(
     machine, strategy = planner.machine, planner.strategy
     offsets = truth.read(rows, strategy.readings, strategy.noise)
     before = [life.belief.at(life.now, rng) for life in lives]
-    believed = np.array([b.new.mean(axis=0) for b in before]), np.array([b.growths.mean(axis=0) for b in before])
+    believed = np.array([b.new.mean(axis=0) for b in before]), np.array([b.growths for b in before])
     readings, gaps = np.full(len(machine.poses.q), strategy.readings), machine.pose_gaps
     measured = read_offsets(machine.linkage, machine.poses, gaps, offsets, readings, strategy.noise, believed)
     for row, life, one in zip(rows, lives, measured, strict=True):

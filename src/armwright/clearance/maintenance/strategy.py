@@ -173,13 +173,14 @@ class Planner:
         machine, growths = self.machine, belief.growths_after(times, self.growth_noise)
         # (n, m, 2, p), for the mean growths: shifts along are in proportion to each growth, those across alike.
         means = growths.mean(axis=1)
-        along, across = machine.shifts.at(means)
-        slopes = (along - machine.shifts.along[0]) / np.maximum(means, np.finfo(float).tiny)[:, None, None]
-        new = machine.shifts.along[0].sum(axis=-1) + np.einsum(
-            "mip,sp->smi", machine.watched.along, belief.new - machine.linkage.clearance_array(None)
-        )
+        along, by_clearance, across = machine.shifts.at(means)
+        first = machine.shifts.along[0]
+        slopes = (along - first) / np.maximum(means, np.finfo(float).tiny)[:, None, None]
         errors = np.einsum("nmip,nsp->nsmi", slopes, growths, optimize=True)
-        errors += np.einsum("nmip,smp->nsmi", across, self.tilts, optimize=True) + new - corrections.at(times)[:, None]
+        new = belief.new - machine.linkage.clearance_array(None)
+        errors += np.einsum("nmip,sp->nsmi", by_clearance, new, optimize=True)
+        errors += np.einsum("nmip,smp->nsmi", across, self.tilts, optimize=True)
+        errors += (first.sum(axis=-1) - corrections.at(times))[:, None]
         squares = (errors**2).sum(axis=-1)
         return np.asarray((squares.max(axis=2) > self.strategy.limit**2).mean(axis=1))
 

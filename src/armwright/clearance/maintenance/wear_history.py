@@ -118,24 +118,26 @@ class WornShifts(NamedTuple):
 
     Attributes:
         growths: (s, p) of the clearances [m].
-        along: (s, m, 2, p) shift of the tip by each pin [m].
+        along: (s, m, 2, p) mean shift of the tip by each pin [m].
+        by_clearance: (s, m, 2, p) shift of the tip by the clearance of the new pin.
         across: (s, m, 2, p) shift of the tip by each pin and the part of its friction cone in which its journal is [m].
     """
 
     growths: Array
     along: Array
+    by_clearance: Array
     across: Array
 
-    def at(self, growths: Array) -> tuple[Array, Array]:
-        """Return (..., m, 2, p) shifts along, and across, after growths (..., p)."""
+    def at(self, growths: Array) -> tuple[Array, Array, Array]:
+        """Return (..., m, 2, p) shifts along, by clearance and across, after growths (..., p)."""
         pins = np.arange(growths.shape[-1])
         row, part = _lines(self.growths, growths)
         part = part[..., None, None]
         found = []
-        for table in (self.along, self.across):
+        for table in (self.along, self.by_clearance, self.across):
             columns = np.moveaxis(table, -1, 1)
             found.append(np.moveaxis((1 - part) * columns[row, pins] + part * columns[row + 1, pins], -3, -1))
-        return found[0], found[1]
+        return found[0], found[1], found[2]
 
 
 class WornGaps(NamedTuple):
@@ -173,11 +175,13 @@ class WornGaps(NamedTuple):
 
     def shifts(self, places: Places) -> WornShifts:
         """Return the shifts of the tip."""
-        along, across = (
-            np.einsum("mipj,smpj->smip", places.gains, gaps)
-            for gaps in (self.gaps[:, 1], (self.gaps[:, 2] - self.gaps[:, 0]) / 2)
+        low, middle, high = np.moveaxis(self.gaps, 1, 0)
+        # Tilts have even chances in the cone: half of them are on each side, a half of its end on average.
+        mean = (low + 2 * middle + high) / 4
+        outward = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
+        return WornShifts(
+            self.growths, *(np.einsum("mipj,smpj->smip", places.gains, x) for x in (mean, outward, (high - low) / 2))
         )
-        return WornShifts(self.growths, along, across)
 
 
 @attrs.frozen(kw_only=True, eq=False)
