@@ -1,8 +1,8 @@
 """A linkage whose pins wear, as its maintenance sees it: what clearances do to the tip, and how they grow.
 
-Along the path and at the poses of a check every journal lies at the wall to which the motion presses it, so that the
-tip is displaced by B c; friction holds a journal anywhere in its cone, which displaces the tip across that by T c φ.
-The walls wear, and with them the places of the journals there change, as a worn life of the linkage tells.
+Along the path and at the poses of a check every journal lies at the wall to which the motion presses it, or anywhere in
+its friction cone about that. The walls wear, and with them the places of the journals change, as a worn life of the
+linkage tells.
 
 Source:
     Spec of the life, 1 and 5; spec of the clearance, 4.3.

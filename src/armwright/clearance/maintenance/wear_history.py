@@ -18,7 +18,6 @@ import numpy as np
 from armwright.arrays import Array, Numbers
 from armwright.clearance.ideal import inverse_dynamics, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.plane_vectors import perpendicular
 from armwright.clearance.static_equilibrium import force_magnitudes
 from armwright.clearance.wear.life import worn_steps
 from armwright.clearance.wear.worn_stroke import Stroke, gaps_in_cones
@@ -45,7 +44,6 @@ class Places:
         tip: (m, 2) position of the tip without clearance [m].
         gains: (m, 2, p, 2) shift of the tip by that of a journal in its bearing.
         along: (m, 2, p) shift of the tip by clearance, B.
-        across: (m, 2, p) shift of the tip by clearance and angle of a journal in its friction cone, T [1/rad].
     """
 
     q: Array
@@ -54,7 +52,6 @@ class Places:
     tip: Array
     gains: Array
     along: Array
-    across: Array
 
     @classmethod
     def of(cls, linkage: Linkage, q: Array, qd: Array | None = None, qdd: Array | None = None) -> Places:
@@ -75,7 +72,6 @@ class Places:
             tip=tip_position(linkage, q),
             gains=gains,
             along=np.einsum("mipj,mpj->mip", gains, directions),
-            across=np.einsum("mipj,mpj->mip", gains, perpendicular(directions)),
         )
 
 

@@ -117,6 +117,7 @@ def wear_life(
     """
     if integer(steps, "steps", least=1) > _MAX_STEPS:
         raise InvalidValueError(f"steps: expected at most {_MAX_STEPS}, got {steps}")
+    wearing_clearances(stroke.linkage)
     surfaces = WornSurfaces.new(len(stroke.linkage.pins), law.bins)
     states, strokes, works, volumes = [surfaces], [0.0], [], [np.zeros(len(stroke.linkage.pins))]
     errors = [tip_errors(stroke, law, surfaces)]
