@@ -2,8 +2,8 @@
 
 A clearance is that of the new pin and its growth. Between checks growths follow the table, and scatter about it as sums
 of independent grains do. At a check the samples are described by a normal distribution of new clearances, growths and
-logarithms of wear coefficients; the posterior is
-found by importance sampling about its mode, so that neither a wide prior nor an accurate reading leaves few samples.
+logarithms of wear coefficients; the posterior is found by importance sampling about its mode, in stages that each
+propose what the one before has found, so that neither a wide prior nor an accurate reading leaves few samples.
 
 Source:
     Kotecha and Djurić, "Gaussian particle filtering", IEEE Transactions on Signal Processing 51 (2003); spec of the
@@ -243,7 +243,7 @@ class Belief:
             weights /= weights.sum()
             # The next stage is about what this one has found, and not narrower than it was.
             mode, before = weights @ u, spread
-            found = np.cov(u, rowvar=False, aweights=weights) + _BLEND * before @ before.T
+            found = np.cov(u, rowvar=False, aweights=weights, ddof=0) + _BLEND * before @ before.T
             spread = np.linalg.cholesky(np.asarray(found, dtype=np.float64))
         u = u[_systematic_sample(weights, rng)]
         new, growths, logs = states(u)

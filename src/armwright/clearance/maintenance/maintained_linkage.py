@@ -105,7 +105,7 @@ def maintained_linkage(
     Args:
         linkage: with the clearances of new pins.
         path: of a stroke.
-        law: of the wear; its coefficient does not count.
+        law: of the wear; its coefficient and its bins do not count.
         exposure: product of strokes and wear coefficient until which the walls are worn [m²/N].
         poses: at which a check holds the arm.
 

@@ -43,6 +43,8 @@ def read_offsets(  # noqa: PLR0917 - what a check consists of
     """
     count, shifts = len(poses.q), gaps.shifts(poses)
     new, samples = believed
+    # Growths beyond the life that is tabulated are believed where next to nothing is known; they may be metres.
+    samples = np.minimum(samples, gaps.growths[-2])
     growths = samples.mean(axis=1)
     tilts = np.array([-1.0, 0.0, 0.0, 1.0])[:, None, None, None]
     resting = gaps.at(new, growths, np.broadcast_to(tilts, (4, len(new), count, new.shape[1]))).mean(axis=0)
