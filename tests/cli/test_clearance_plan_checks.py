@@ -10,7 +10,7 @@ from cli_calls import armwright, check_mistake
 CHECKS = str(Path(__file__).parents[2] / "examples" / "five_bar_checks.csv")
 NEW = ("--clearance", "J2=0.1", "--clearance", "J3=0.1", "--clearance", "J4=0.1")
 BAR = ("five-bar", "--path", "pick-and-place", "--k", "1e-4", "--limit", "0.1", *NEW)
-SMALL = ("--horizon", "1.2e7", "--lives", "2", "--json")
+SMALL = ("--horizon", "1e7", "--lives", "2", "--json")
 
 
 def test_plan_after_two_checks(tmp_path: Path) -> None:

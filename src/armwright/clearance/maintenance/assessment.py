@@ -25,7 +25,7 @@ from armwright.files.result_table import ResultTable
 # Corrections that are printed; the others are in the files.
 _SHOWN = 12
 # Simulated lives are many, and their next checks may scatter more.
-_FEWER = 30
+_FEWER = 20
 _LEVEL = 0.9
 
 
@@ -308,7 +308,7 @@ def plan_checks(
     strokes: float | None = None,
     strokes_per_day: float | None = None,
     lives: int = 20,
-    samples: int = 30_000,
+    samples: int = 20_000,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> CheckPlan:
@@ -323,7 +323,7 @@ def plan_checks(
         strokes: done until now; those of the last check or change when left out.
         strokes_per_day: for the notes.
         lives: simulated, of each way of maintenance.
-        samples: of the filter; that of a simulated life has a thirtieth.
+        samples: of the filter; that of a simulated life has a twentieth.
         seed: of all random numbers.
         progress: called with the number of simulated hundredths, and of all.
 

@@ -27,8 +27,8 @@ from armwright.errors import InvalidValueError, ShapeError
 _LEAST_CLEARANCE = 1e-7
 # Degrees of freedom of the proposal: its tails are wider than those of the posterior.
 _TAILS = 6.0
-# Proposals are improved so often; what is kept of the spread of the one before.
-_STAGES, _BLEND = 3, 0.1
+# Samples by which proposals are improved, and what is kept of the spread of the one before.
+_PILOTS, _BLEND = 1000, 0.1
 # The search for the mode begins at the mean and at so many of the best samples.
 _STARTS = 3
 # Its steps of derivatives, in standard deviations; the parts of a step that are tried; and what ends it.
@@ -225,14 +225,15 @@ class Belief:
             return np.concatenate([u, misfit @ whiten.T], axis=-1)
 
         # Walls of many shapes fit about as well: the search begins at the best of some samples.
-        starts = np.concatenate([np.zeros((1, size + p)), rng.standard_normal((count, size + p))])
+        few = min(count, _PILOTS)
+        starts = np.concatenate([np.zeros((1, size + p)), rng.standard_normal((few, size + p))])
         order = (residuals(starts) ** 2).sum(axis=-1).argsort()
         modes = [_mode(residuals, starts[row]) for row in {0, *order[:_STARTS].tolist()}]
         mode, spread = min(modes, key=lambda one: float((residuals(one[0]) ** 2).sum()))
         least = float((residuals(mode) ** 2).sum())
-        for _ in range(_STAGES):
-            normal = rng.standard_normal((count, size + p))
-            scale = np.sqrt(_TAILS / rng.chisquare(_TAILS, (count, 1)))
+        for drawn in (few, few, count):
+            normal = rng.standard_normal((drawn, size + p))
+            scale = np.sqrt(_TAILS / rng.chisquare(_TAILS, (drawn, 1)))
             u = mode + (normal * scale) @ spread.T
             squares = (residuals(u) ** 2).sum(axis=-1)
             least = min(least, float(squares.min()))

@@ -171,18 +171,18 @@ class Planner:
     def probabilities(self, belief: Belief, corrections: Corrections, times: Array) -> Array:
         """Return (n,) the probability that a stroke is out of limit anywhere, after strokes (n,)."""
         machine, growths = self.machine, belief.growths_after(times, self.growth_noise)
-        # (n, m, 2, p), for the mean growths: shifts along are in proportion to each growth, those across alike.
+        # For the mean growths: shifts along are in proportion to each growth, those across alike.
         means = growths.mean(axis=1)
         along, by_clearance, across = machine.shifts.at(means)
         first = machine.shifts.along[0]
         slopes = (along - first) / np.maximum(means, np.finfo(float).tiny)[:, None, None]
-        errors = np.einsum("nmip,nsp->nsmi", slopes, growths, optimize=True)
         new = belief.new - machine.linkage.clearance_array(None)
-        errors += np.einsum("nmip,sp->nsmi", by_clearance, new, optimize=True)
-        errors += np.einsum("nmip,smp->nsmi", across, self.tilts, optimize=True)
-        errors += (first.sum(axis=-1) - corrections.at(times))[:, None]
-        squares = (errors**2).sum(axis=-1)
-        return np.asarray((squares.max(axis=2) > self.strategy.limit**2).mean(axis=1))
+        errors = np.einsum("nmip,nsp->imns", slopes, growths, optimize=True)
+        errors += np.einsum("nmip,sp->imns", by_clearance, new, optimize=True)
+        errors += np.einsum("nmip,smp->imns", across, self.tilts, optimize=True)
+        errors += np.einsum("nmi->imn", first.sum(axis=-1) - corrections.at(times))[..., None]
+        squares = (errors[0] ** 2 + errors[1] ** 2).max(axis=0)
+        return np.asarray((squares > self.strategy.limit**2).mean(axis=1))
 
     def next_stop(self, belief: Belief) -> NextStop:
         """Return when the next check is due; at the latest when a mean clearance reaches that of a change."""
