@@ -10,7 +10,7 @@ from cli_calls import armwright, check_mistake
 CHECKS = str(Path(__file__).parents[2] / "examples" / "five_bar_checks.csv")
 NEW = ("--clearance", "J2=0.1", "--clearance", "J3=0.1", "--clearance", "J4=0.1")
 BAR = ("five-bar", "--path", "pick-and-place", "--k", "1e-4", "--limit", "0.1", *NEW)
-SMALL = ("--horizon", "1.2e7", "--lives", "2", "--json")
+SMALL = ("--horizon", "1e7", "--lives", "2", "--json")
 
 
 def test_plan_after_two_checks(tmp_path: Path) -> None:
@@ -21,13 +21,13 @@ def test_plan_after_two_checks(tmp_path: Path) -> None:
     )  # fmt: skip
 
     data = json.loads(done.stdout)
-    assert [round(known["strokes"]) for known in data["history"]] == [0, 1_600_000, 6_000_000]
+    assert [round(known["strokes"]) for known in data["history"]] == [0, 2_600_000, 9_000_000]
     for pin, k in (("J2", 1.4e-13), ("J3", 0.9e-13), ("J4", 0.8e-13)):
         low, _, high = data["history"][-1]["wear_coefficients"][pin]
         assert low < k < high
     assert len(data["poses"]) == 3
-    assert data["next_check"] is None or data["next_check"] > 6e6
-    assert data["corrections"][0]["strokes"] == 6e6
+    assert data["next_check"] is None or data["next_check"] > 9e6
+    assert data["corrections"][0]["strokes"] == 9e6
     files = {path.name for path in (tmp_path / "plan").iterdir()}
     assert files >= {
         "report.html", "plan.json", "corrections.csv", "timeline.svg", "clearances.svg", "stops.svg"

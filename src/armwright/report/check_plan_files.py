@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from armwright.arrays import Array
 from armwright.clearance.maintenance.assessment import CheckPlan
 from armwright.report.elements import Card, Tile, downloads, figures, tables
 from armwright.report.figures import Drawing, empty_figure, plain_axes, plain_label, svg_text
@@ -21,13 +22,10 @@ def check_plan_files(plan: CheckPlan, *, command: str) -> dict[str, Any]:
         command: the command line that made it.
     """
     drawn = [_timeline(plan), _clearances(plan), _stops(plan)]
-    beside = {"plan.json": "all numbers, in SI units", "corrections.csv": "clearances for which the path is corrected"}
-    strokes, clearances = zip(*plan.corrections(), strict=True)
-    columns = {"strokes": np.array(strokes)}
-    columns |= {f"{pin}_m": np.array(clearances)[:, i] for i, pin in enumerate(plan.pins)}
+    beside = {"plan.json": "all numbers, in SI units", "corrections.csv": "by how much each correction moves the path"}
     return {
         "plan.json": json.dumps({"command": command, **plan.as_data()}, indent=2, ensure_ascii=False) + "\n",
-        "corrections.csv": csv_lines(columns, 9),
+        "corrections.csv": csv_lines(_moves(plan), 9),
         "report.html": static_page(
             title=f"{plan.machine.linkage.name}: checks on {plan.machine.stroke.name}",
             command=command,
@@ -40,6 +38,25 @@ def check_plan_files(plan: CheckPlan, *, command: str) -> dict[str, Any]:
             notes=plan.notes,
         ),
         **{f"{drawing.name}.svg": drawing.svg for drawing in drawn},
+    }
+
+
+def _moves(plan: CheckPlan) -> dict[str, Array]:
+    """Return columns with a row for each correction and place of the path."""
+    machine = plan.machine
+    strokes, _, moves = zip(*plan.corrections(), strict=True)
+    count, places = len(strokes), machine.watched
+    names: tuple[str, ...] = ("x_m", "y_m")
+    commanded = places.tip
+    if not machine.by_tip:
+        (drive,) = machine.linkage.driven
+        unit = "m" if machine.linkage.coordinates[drive].kind == "slide" else "rad"
+        names, commanded = (f"{machine.linkage.drives[0].body}_{unit}",), places.q[:, [drive]]
+    return {
+        "strokes": np.repeat(strokes, len(machine.times)),
+        "t_s": np.tile(machine.times, count),
+        **{f"commanded_{name}": np.tile(commanded[:, i], count) for i, name in enumerate(names)},
+        **{f"move_{name}": np.concatenate(moves)[:, i] for i, name in enumerate(names)},
     }
 
 
@@ -60,7 +77,7 @@ def _timeline(plan: CheckPlan) -> Drawing:
     lives = sorted(plan.planned.lives, key=lambda life: len(life.stops))
     typical = lives[len(lives) // 2]
     past = [known.strokes for known in plan.history[1:]]
-    planned = [n for n, _ in plan.corrections()]
+    planned = [n for n, _, _ in plan.corrections()]
     later = [stop.strokes for stop in typical.stops]
     changed = [(stop.strokes, plan.pins[pin]) for stop in typical.stops for pin in stop.changed]
     rows = {"check": 2, "correct": 1, "change": 0}

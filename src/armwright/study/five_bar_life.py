@@ -27,6 +27,7 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.static_equilibrium import find_static_equilibrium
 from armwright.clearance.vibration.assessment import RattlingAssessment, assess_rattling
 from armwright.clearance.wear.worn_surfaces import WearLaw
+from armwright.errors import counted
 from armwright.files.result_table import ResultTable
 from armwright.reliability.assessment import ToleranceAssessment
 from armwright.reliability.linkage_assessment import LinkageReliability, WearStatement, assess_linkage
@@ -250,13 +251,15 @@ class FiveBarLife:
         same = self.plan.equally_safe()
         rows = [
             (
-                "checks when they are due" if one.checks is None else f"{one.checks} checks at equal distances",
+                "checks when they are due"
+                if one.checks is None
+                else f"{counted(one.checks, 'check')} at equal distances",
                 f"{one.stops.mean():.2f}",
                 f"{one.changes.mean():.2f}",
                 f"{100 * one.outside.mean():.3f}",
             )
             for one in (self.plan.planned, *self.plan.fixed)
-            if one.checks in {None, 0} or one is same or one is self.plan.fixed[-1]
+            if one.checks is None or one is same or one in {self.plan.fixed[0], self.plan.fixed[-1]}
         ]
         return ResultTable(
             title=f"6.2-6: arm A, its path kept within {PLAN_LIMIT * 1e3:g} mm for {HORIZON:.3g} strokes",

@@ -14,7 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array, finite_or_none, integer, not_negative
 from armwright.clearance.estimation.misfit import CONTRADICTION, p_value
-from armwright.clearance.maintenance.belief import Belief, WearPrior
+from armwright.clearance.maintenance.belief import FEWEST_SAMPLES, Belief, WearPrior
 from armwright.clearance.maintenance.check_file import PastCheck
 from armwright.clearance.maintenance.comparison import Maintained, compare_ways, standard_error
 from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
@@ -24,6 +24,8 @@ from armwright.files.result_table import ResultTable
 
 # Corrections that are printed; the others are in the files.
 _SHOWN = 12
+# Simulated lives are many, and their next checks may scatter more.
+_FEWER = 20
 _LEVEL = 0.9
 
 
@@ -88,11 +90,17 @@ class CheckPlan:
         """Names of the pins."""
         return tuple(self.machine.linkage.clearances)
 
-    def corrections(self) -> Iterator[tuple[float, Array]]:
-        """Give strokes, and (p,) the clearances for which the path is corrected then, until the next check [m]."""
-        for strokes, clearances in zip(*self.next_stop.corrections, strict=True):
+    def corrections(self) -> Iterator[tuple[float, Array, Array]]:
+        """Give each correction of the path until the next check.
+
+        Yields:
+            Its strokes, (p,) the mean clearances that it is made for [m], and (m, 2) how it moves the commanded tip at
+            the watched places [m], or (m, 1) the single drive [rad, m].
+        """
+        planned = self.next_stop.corrections
+        for strokes, clearances, taken in zip(*planned, strict=True):
             if strokes < min(self.next_stop.strokes, self.planner.strategy.horizon):
-                yield float(strokes), clearances
+                yield float(strokes), clearances, self.machine.moves(taken)
 
     def equally_safe(self) -> Maintained | None:
         """Return the fewest checks at equal distances that are as safe as the plan."""
@@ -147,9 +155,13 @@ class CheckPlan:
                 "probabilities": self.next_stop.probabilities.tolist(),
             },
             "poses": [{"tip": tip.tolist(), "drives": drives.tolist()} for tip, drives in self.poses()],
+            "places": [
+                {"time": time, "tip": tip}
+                for time, tip in zip(self.machine.times.tolist(), self.machine.watched.tip.tolist(), strict=True)
+            ],
             "corrections": [
-                {"strokes": n, "clearances": dict(zip(self.pins, c.tolist(), strict=True))}
-                for n, c in self.corrections()
+                {"strokes": n, "clearances": dict(zip(self.pins, c.tolist(), strict=True)), "moves": moves.tolist()}
+                for n, c, moves in self.corrections()
             ],
             "forecast": {
                 "strokes": times.tolist(),
@@ -178,10 +190,10 @@ class CheckPlan:
         if self.due:
             notes.append(f"change now: {', '.join(self.due)}; a correction of the path helps no longer")
         stops, until = self.planned.stops, f"until {strategy.horizon:.4g} strokes, of {len(self.planned.lives)} lives"
-        command = ": armwright clearance correct --clearance PIN=MM" if self.machine.by_tip else ""
+        moved = "commanded tip" if self.machine.by_tip else "drive"
         notes += [
             f"expected stops: {stops.mean():.3g} ± {standard_error(stops):.2g} {until}",
-            f"correct the path for the clearances of the table{command}",
+            f"corrections.csv (-o) has by how much a correction moves the {moved} at moments and goals of the path",
             "errors are those of journals that lie at their walls, anywhere in their friction cones, without impacts",
         ]
         if self.machine.left_out:
@@ -240,12 +252,20 @@ class CheckPlan:
             ],
             numbers=range(1, 3 + len(drives)),
         )
-        rows = [(f"{n:.4g}", *(f"{c * 1e3:.4f}" for c in clearances)) for n, clearances in self.corrections()]
+        head, scale = ("tip mm", 1e3) if self.machine.by_tip else (f"{drives[0]} {units[0][0]}", units[0][1])
+        rows = [
+            (
+                f"{n:.4g}",
+                *(f"{c * 1e3:.4f}" for c in clearances),
+                f"{np.linalg.norm(moves, axis=-1).max() * scale:.4f}",
+            )
+            for n, clearances, moves in self.corrections()
+        ]
         yield ResultTable(
             title="Corrections of the path until the next check",
-            heads=("strokes", *(f"{pin} mm" for pin in self.pins)),
+            heads=("strokes", *(f"{pin} mm" for pin in self.pins), f"largest move of {head}"),
             rows=rows[:_SHOWN],
-            numbers=range(1 + len(self.pins)),
+            numbers=range(2 + len(self.pins)),
             remark=f"and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else "",
         )
         yield ResultTable(
@@ -288,7 +308,7 @@ def plan_checks(
     strokes: float | None = None,
     strokes_per_day: float | None = None,
     lives: int = 20,
-    samples: int = 1000,
+    samples: int = 20_000,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> CheckPlan:
@@ -303,7 +323,7 @@ def plan_checks(
         strokes: done until now; those of the last check or change when left out.
         strokes_per_day: for the notes.
         lives: simulated, of each way of maintenance.
-        samples: of the filter.
+        samples: of the filter; that of a simulated life has a twentieth.
         seed: of all random numbers.
         progress: called with the number of simulated hundredths, and of all.
 
@@ -315,7 +335,7 @@ def plan_checks(
     integer(lives, "simulated lives", least=2)
     rng = np.random.default_rng([seed, 0])
     planner = Planner.of(machine, strategy, samples, seed)
-    history = learn(planner, Belief.new(prior, machine.table, rng, samples), checks, changed or {}, rng)
+    history = learn(planner, Belief.of_new_pins(prior, machine.history.table, rng, samples), checks, changed or {}, rng)
     belief = history[-1]
     now = belief.strokes if strokes is None else strokes
     if not belief.strokes <= not_negative(now, "strokes done") < strategy.horizon:
@@ -332,7 +352,9 @@ def plan_checks(
             f"strokes, with all corrections and changes; expected {strategy.soonest:.3g} or more, a tenth of the least "
             f"interval"
         )
-    planned, *fixed = compare_ways(planner, history[-1], lives, seed, progress)
+    few = max(samples // _FEWER, FEWEST_SAMPLES)
+    start = history[-1].thinned(few, rng)
+    planned, *fixed = compare_ways(Planner.of(machine, strategy, few, seed), start, lives, seed, progress)
     return CheckPlan(
         planner=planner,
         history=[Known.of(known) for known in history],
@@ -379,7 +401,7 @@ def learn(
         if isinstance(event, str):
             history.append(before.with_new_bearing(names.index(event), rng))
         else:
-            measured = event.measured(machine, planner.strategy.noise, before.clearances.mean(axis=0))
+            measured = event.measured(machine, planner.strategy.noise, (before.new.mean(axis=0), before.growths))
             history.append(history[-1].updated(moment, measured, rng))
             _refuse_surprise(history[-1], len(measured.values))
     return history

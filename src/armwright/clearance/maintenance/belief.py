@@ -1,8 +1,9 @@
 """What is known of the clearances and wear coefficients of pins: samples, updated by what a check measures.
 
-Between checks clearances grow after the table, and scatter about it as sums of independent grains do. At a check the
-samples are described by a normal distribution of clearances and logarithms of wear coefficients; the posterior is
-found by importance sampling about its mode, so that neither a wide prior nor an accurate reading leaves few samples.
+A clearance is that of the new pin and its growth. Between checks growths follow the table, and scatter about it as sums
+of independent grains do. At a check the samples are described by a normal distribution of new clearances, growths and
+logarithms of wear coefficients; the posterior is found by importance sampling about its mode, in stages that each
+propose what the one before has found, so that neither a wide prior nor an accurate reading leaves few samples.
 
 Source:
     Kotecha and Djurić, "Gaussian particle filtering", IEEE Transactions on Signal Processing 51 (2003); spec of the
@@ -11,6 +12,7 @@ Source:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import attrs
@@ -18,14 +20,20 @@ import numpy as np
 from scipy.special import ndtri
 
 from armwright.arrays import Array, Numbers, integer, not_negative, positive
-from armwright.clearance.maintenance.maintained_linkage import GrowthTable
+from armwright.clearance.maintenance.wear_history import GrowthTable
 from armwright.errors import InvalidValueError, ShapeError
 
 # No pin has less [m].
 _LEAST_CLEARANCE = 1e-7
 # Degrees of freedom of the proposal: its tails are wider than those of the posterior.
 _TAILS = 6.0
-_FEWEST, _MOST = 100, 100_000
+# Samples by which proposals are improved, and what is kept of the spread of the one before.
+_PILOTS, _BLEND = 1000, 0.1
+# The search for the mode begins at the mean and at so many of the best samples.
+_STARTS = 3
+# Its steps of derivatives, in standard deviations; the parts of a step that are tried; and what ends it.
+_ITERATIONS, _DIFFERENCE, _PARTS, _STILL = 20, 0.3, 0.5 ** np.arange(7.0), 1e-4
+FEWEST_SAMPLES, _MOST = 100, 100_000
 # A logarithm within which no wear coefficient is bounded by rounding.
 _WIDEST = 5.0
 
@@ -107,15 +115,15 @@ class WearPrior:
 
 
 class Measured(NamedTuple):
-    """What a check says of the clearances: values = design · c + normal errors.
+    """What a check says of the pins: values that were predicted, with normal errors.
 
     Attributes:
-        design: (k, p).
+        predicted: (..., k) values for new clearances (..., p) and growths (..., p) [m].
         values: (k,) [m].
         covariance: (k, k) of their errors [m²].
     """
 
-    design: Array
+    predicted: Callable[[Array, Array], Array]
     values: Array
     covariance: Array
 
@@ -128,7 +136,8 @@ class Belief:
         prior: of new pins.
         table: growth of the clearances.
         strokes: done.
-        clearances: (s, p) [m].
+        new: (s, p) clearances of the new pins [m].
+        growths: (s, p) of the clearances since [m].
         logs: (s, p) natural logarithms of the wear coefficients [m²/N].
         misfit: sum of the squares by which the last check and what was believed before disagree at least, in standard
             deviations; it follows chi-square with as many degrees of freedom as values were measured.
@@ -137,33 +146,48 @@ class Belief:
     prior: WearPrior
     table: GrowthTable
     strokes: float
-    clearances: Array
+    new: Array
+    growths: Array
     logs: Array
     misfit: float = 0.0
 
     @classmethod
-    def new(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
+    def of_new_pins(cls, prior: WearPrior, table: GrowthTable, rng: np.random.Generator, samples: int = 1000) -> Belief:
         """Return what is known of new pins."""
-        if not _FEWEST <= integer(samples, "samples", least=1) <= _MOST:
-            raise InvalidValueError(f"samples: expected {_FEWEST} to {_MOST}, got {samples}")
-        clearances, logs = prior.draw(rng, samples)
-        return cls(prior=prior, table=table, strokes=0.0, clearances=clearances, logs=logs)
+        if not FEWEST_SAMPLES <= integer(samples, "samples", least=1) <= _MOST:
+            raise InvalidValueError(f"samples: expected {FEWEST_SAMPLES} to {_MOST}, got {samples}")
+        new, logs = prior.draw(rng, samples)
+        return cls(prior=prior, table=table, strokes=0.0, new=new, growths=np.zeros_like(new), logs=logs)
 
-    def forecast(self, strokes: Array, noise: Array) -> Array:
-        """Return (n, s, p) clearances after as many strokes (n,) altogether.
+    @property
+    def clearances(self) -> Array:
+        """(s, p) [m]."""
+        return self.new + self.growths
+
+    def growths_after(self, strokes: Array, noise: Array) -> Array:
+        """Return (n, s, p) growths of the clearances after as many strokes (n,) altogether [m].
 
         Args:
             strokes: none before those already done.
             noise: (s, p) standard normal numbers, of the scatter of the growth [1].
         """
         exposure = (strokes[:, None, None] - self.strokes) * np.exp(self.logs)
-        mean = self.table.grown(self.clearances, exposure)
-        return np.maximum(mean + self.prior.growth_deviation(mean - self.clearances) * noise, _LEAST_CLEARANCE)
+        mean = self.table.grown(self.growths, exposure)
+        return np.maximum(mean + self.prior.growth_deviation(mean - self.growths) * noise, 0.0)
+
+    def forecast(self, strokes: Array, noise: Array) -> Array:
+        """Return (n, s, p) clearances after as many strokes (n,) altogether [m]; see ``growths_after``."""
+        return self.new + self.growths_after(strokes, noise)
 
     def at(self, strokes: float, rng: np.random.Generator) -> Belief:
         """Return what is known after more strokes, without a measurement."""
         noise = rng.standard_normal(self.clearances.shape)
-        return attrs.evolve(self, strokes=strokes, clearances=self.forecast(np.array([strokes]), noise)[0])
+        return attrs.evolve(self, strokes=strokes, growths=self.growths_after(np.array([strokes]), noise)[0])
+
+    def thinned(self, samples: int, rng: np.random.Generator) -> Belief:
+        """Return what is known with fewer samples, drawn from these."""
+        rows = rng.choice(len(self.new), samples, replace=False)
+        return attrs.evolve(self, new=self.new[rows], growths=self.growths[rows], logs=self.logs[rows])
 
     def updated(self, strokes: float, measured: Measured, rng: np.random.Generator) -> Belief:
         """Return what is known after a check.
@@ -176,50 +200,62 @@ class Belief:
         Raises:
             InvalidValueError: the check is earlier than what is known, or its errors have no covariance.
         """
-        from scipy.optimize import least_squares  # noqa: PLC0415 - a slow import
-
         if strokes < self.strokes:
             raise InvalidValueError(f"strokes: expected at least {self.strokes:g}, got {strokes:g}")
-        state = np.concatenate([self.clearances, self.logs], axis=-1)
-        p, (count, size) = self.clearances.shape[1], state.shape
+        state = np.concatenate([self.new, self.growths, self.logs], axis=-1)
+        p, (count, size) = self.new.shape[1], state.shape
         mean, factor = state.mean(axis=0), _root(np.cov(state, rowvar=False))
         try:
             whiten = np.linalg.inv(np.linalg.cholesky(measured.covariance))
         except np.linalg.LinAlgError:
             raise InvalidValueError("measured: expected a positive definite covariance") from None
 
-        def states(u: Array) -> tuple[Array, Array]:
-            """Return clearances now and logarithms, for rows of independent standard normal numbers (..., 3 p)."""
+        def states(u: Array) -> tuple[Array, Array, Array]:
+            """Return new clearances, growths now and logarithms, for rows of standard normal numbers (..., 4 p)."""
             before = mean + u[..., :size] @ factor.T
-            c, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., p:]
-            grown = self.table.grown(c, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
-            return grown + self.prior.growth_deviation(grown - c) * u[..., size:], logs
+            new, logs = np.maximum(before[..., :p], _LEAST_CLEARANCE), before[..., 2 * p :]
+            growths = np.maximum(before[..., p : 2 * p], 0.0)
+            grown = self.table.grown(growths, (strokes - self.strokes) * np.exp(np.minimum(logs, 0.0)))
+            now = np.maximum(grown + self.prior.growth_deviation(grown - growths) * u[..., size:], 0.0)
+            return new, now, logs
 
         def residuals(u: Array) -> Array:
-            misfit = measured.values - states(u)[0] @ measured.design.T
+            new, growths, _ = states(u)
+            misfit = measured.values - measured.predicted(new, growths)
             return np.concatenate([u, misfit @ whiten.T], axis=-1)
 
-        found = least_squares(residuals, np.zeros(size + p), method="lm", diff_step=1e-6)
-        spread = np.linalg.cholesky(np.linalg.inv(found.jac.T @ found.jac))
-        normal = rng.standard_normal((count, size + p))
-        scale = np.sqrt(_TAILS / rng.chisquare(_TAILS, (count, 1)))
-        u = found.x + (normal * scale) @ spread.T
-        # The logarithm of a density of Student, without its constant.
-        proposed = -0.5 * (_TAILS + size + p) * np.log1p(((normal * scale) ** 2).sum(axis=-1) / _TAILS)
-        weights = -0.5 * (residuals(u) ** 2).sum(axis=-1) - proposed
-        weights = np.exp(weights - weights.max())
+        # Walls of many shapes fit about as well: the search begins at the best of some samples.
+        few = min(count, _PILOTS)
+        starts = np.concatenate([np.zeros((1, size + p)), rng.standard_normal((few, size + p))])
+        order = (residuals(starts) ** 2).sum(axis=-1).argsort()
+        modes = [_mode(residuals, starts[row]) for row in {0, *order[:_STARTS].tolist()}]
+        mode, spread = min(modes, key=lambda one: float((residuals(one[0]) ** 2).sum()))
+        least = float((residuals(mode) ** 2).sum())
+        for drawn in (few, few, count):
+            normal = rng.standard_normal((drawn, size + p))
+            scale = np.sqrt(_TAILS / rng.chisquare(_TAILS, (drawn, 1)))
+            u = mode + (normal * scale) @ spread.T
+            squares = (residuals(u) ** 2).sum(axis=-1)
+            least = min(least, float(squares.min()))
+            # The logarithm of a density of Student, without its constant.
+            proposed = -0.5 * (_TAILS + size + p) * np.log1p(((normal * scale) ** 2).sum(axis=-1) / _TAILS)
+            weights = -0.5 * squares - proposed
+            weights = np.exp(weights - weights.max())
+            weights /= weights.sum()
+            # The next stage is about what this one has found, and not narrower than it was.
+            mode, before = weights @ u, spread
+            found = np.cov(u, rowvar=False, aweights=weights, ddof=0) + _BLEND * before @ before.T
+            spread = np.linalg.cholesky(np.asarray(found, dtype=np.float64))
         u = u[_systematic_sample(weights, rng)]
-        clearances, logs = states(u)
-        clearances = np.maximum(clearances, _LEAST_CLEARANCE)
-        return attrs.evolve(
-            self, strokes=strokes, clearances=clearances, logs=logs, misfit=float(found.fun @ found.fun)
-        )
+        new, growths, logs = states(u)
+        return attrs.evolve(self, strokes=strokes, new=new, growths=growths, logs=logs, misfit=least)
 
     def with_new_bearing(self, pin: int, rng: np.random.Generator) -> Belief:
         """Return what is known after a bearing was changed."""
-        clearances, logs = self.clearances.copy(), self.logs.copy()
-        clearances[:, pin], logs[:, pin] = self.prior.new_bearing(pin, self.logs, rng)
-        return attrs.evolve(self, clearances=clearances, logs=logs)
+        new, growths, logs = self.new.copy(), self.growths.copy(), self.logs.copy()
+        new[:, pin], logs[:, pin] = self.prior.new_bearing(pin, self.logs, rng)
+        growths[:, pin] = 0.0
+        return attrs.evolve(self, new=new, growths=growths, logs=logs)
 
     def interval(self, level: float = 0.9) -> tuple[Array, Array]:
         """Return (2, p) the bounds between which clearances [m] and wear coefficients [m²/N] lie with a probability."""
@@ -230,6 +266,26 @@ class Belief:
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
+
+
+def _mode(residuals: Callable[[Array], Array], start: Array) -> tuple[Array, Array]:
+    """Return where (n,), near a start, the sum of the squares of residuals is least, and a root of the covariance.
+
+    Residuals have corners, at the states between which the walls of a life are lines: derivatives are differences over
+    a good part of a standard deviation.
+    """
+    x, size = start, len(start)
+    for _ in range(_ITERATIONS):
+        steps = _DIFFERENCE * np.eye(size)
+        jacobian = (residuals(x + steps) - residuals(x - steps)).T / (2 * _DIFFERENCE)
+        now, information = residuals(x), jacobian.T @ jacobian
+        tried = x - _PARTS[:, None] * np.linalg.solve(information, jacobian.T @ now)
+        squares = (residuals(tried) ** 2).sum(axis=-1)
+        best = int(squares.argmin())
+        if squares[best] > (now**2).sum() - _STILL:
+            break
+        x = tried[best]
+    return x, np.linalg.cholesky(np.linalg.inv(information))
 
 
 def _root(covariance: Array) -> Array:

@@ -17,8 +17,9 @@ from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import refuse_large_errors
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.maintenance.belief import Measured
-from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
 from armwright.clearance.maintenance.readings import read_offsets
+from armwright.clearance.maintenance.wear_history import Places
 from armwright.clearance.poses import closed_at_tips
 from armwright.errors import UnknownNameError
 from armwright.files.column_names import LENGTH, NUMBER, Column, Schema
@@ -58,19 +59,21 @@ class RestCheck:
     offsets: Array
     readings: Array
 
-    def measured(self, machine: MaintainedLinkage, noise: float, believed: Array) -> Measured:
+    def measured(self, machine: MaintainedLinkage, noise: float, believed: tuple[Array, Array]) -> Measured:
         """Return what the readings say of the clearances.
 
         Args:
             machine: that was measured.
             noise: standard deviation of one coordinate of a reading [m].
-            believed: (p,) mean clearances before [m].
+            believed: (p,) mean clearances of the new pins before, and (s, p) samples of their growths [m].
 
         Raises:
             InvalidValueError: a pose cannot be reached, or a pin carries no force there.
         """
         poses = Places.of(machine.linkage, closed_at_tips(machine.linkage, self.poses))
-        return read_offsets(machine, poses, self.offsets[None], self.readings, noise, believed[None])[0]
+        gaps = machine.history.gaps(poses)
+        before = believed[0][None], believed[1][None]
+        return read_offsets(machine.linkage, poses, gaps, self.offsets[None], self.readings, noise, before)[0]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -89,11 +92,15 @@ class ClearanceCheck:
     clearances: Array
     deviations: Array
 
-    def measured(self, machine: MaintainedLinkage, noise: float, believed: Array) -> Measured:
+    def measured(self, machine: MaintainedLinkage, noise: float, believed: tuple[Array, Array]) -> Measured:
         """Return what they say of all clearances; they need neither poses nor the noise of readings."""
-        del machine, noise
-        design = np.eye(len(believed))[list(self.pins)]
-        return Measured(design=design, values=self.clearances, covariance=np.diag(self.deviations**2))
+        del machine, noise, believed
+        pins = list(self.pins)
+        return Measured(
+            predicted=lambda new, growths: (new + growths)[..., pins],
+            values=self.clearances,
+            covariance=np.diag(self.deviations**2),
+        )
 
 
 PastCheck: TypeAlias = RestCheck | ClearanceCheck

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.maintenance.belief import Belief
-from armwright.clearance.maintenance.simulated_lives import SimulatedLife, simulate_lives
+from armwright.clearance.maintenance.simulated_lives import SimulatedLife, draw_wears, simulate_lives
 from armwright.clearance.maintenance.strategy import Planner
 
 # Checks in a horizon with which a plan is compared, fewest first.
@@ -87,6 +88,7 @@ def compare_ways(
         seed: of all random numbers; all ways meet the same linkages.
         progress: called with the number of simulated hundredths, and of all.
     """
+    wears = draw_wears(planner, belief, math.ceil(math.sqrt(count)), seed)
     left, total = planner.strategy.horizon - belief.strokes, 100 * (1 + len(FIXED_CHECKS))
 
     def maintained(number: int | None, turn: int) -> Maintained:
@@ -95,7 +97,7 @@ def compare_ways(
                 progress(100 * turn + round(100 * part), total)
 
         interval = None if number is None else left / (number + 1)
-        lives = simulate_lives(planner, belief, count, seed=seed, interval=interval, progress=advance)
+        lives = simulate_lives(planner, belief, count, wears=wears, seed=seed, interval=interval, progress=advance)
         return Maintained(checks=number, lives=lives, strokes=left)
 
     plan = maintained(None, 0)

@@ -1,7 +1,7 @@
 """Simulated lives of a linkage, maintained after a strategy: what a plan is worth.
 
-The simulated linkage is not the one that the plan believes in: its journals lie where the full equilibrium puts them,
-its forces and sliding distances are those of all its clearances together, its wear comes in random grains, and friction
+The simulated linkage is not the one that the plan believes in: its walls wore with other clearances and another wear
+coefficient of each pin, its tip is where the full kinematics put it, its wear comes in random grains, and friction
 holds each journal somewhere else at every visit.
 
 Source:
@@ -10,29 +10,23 @@ Source:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 
 from armwright.arrays import Array, Numbers, integer
-from armwright.clearance.ideal import IdealMotion, close_pins, inverse_dynamics, tip_position
-from armwright.clearance.linkage import Linkage
+from armwright.clearance.ideal import close_pins
 from armwright.clearance.maintenance.belief import Belief
-from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage, Places
-from armwright.clearance.maintenance.readings import read_offsets
+from armwright.clearance.maintenance.maintained_linkage import MaintainedLinkage
+from armwright.clearance.maintenance.readings import read_offsets, tips_of
 from armwright.clearance.maintenance.strategy import NextStop, Planner
-from armwright.clearance.plane_vectors import rotate
-from armwright.clearance.settings import contact_stiffness
-from armwright.clearance.static_equilibrium import force_magnitudes
-from armwright.clearance.wear.contact_history import leaning_slips, pin_angles
+from armwright.clearance.maintenance.wear_history import WearHistory, WornGaps
 from armwright.errors import InvalidValueError
 
 # Between two stops the error is looked at after so many numbers of strokes, each time of so many visits.
 _LOOKS, _VISITS = 4, 8
-# Equilibrium and forces depend a little on each other.
-_ROUNDS = 3
 # Of the posterior of the wear coefficients.
 _LEVEL = 0.9
 _MOST_LIVES = 10_000
@@ -42,6 +36,39 @@ _NONE = 1e-12
 _MANY = 30
 # What is so near to the horizon is at it, but for rounding.
 _END = 1 - 1e-9
+
+
+class SimulatedWear(NamedTuple):
+    """A linkage that wears.
+
+    Attributes:
+        history: of its walls.
+        watched: gaps of its pins where the error of the tip counts.
+        poses: gaps of its pins at the poses of a check.
+    """
+
+    history: WearHistory
+    watched: WornGaps
+    poses: WornGaps
+
+    @classmethod
+    def of(cls, machine: MaintainedLinkage, clearances: Array, coefficients: Array) -> SimulatedWear:
+        """Wear a linkage, as far as the one that it is built like.
+
+        Args:
+            machine: that it is built like.
+            clearances: (p,) of its new pins [m].
+            coefficients: (p,) of their wear [m²/N].
+        """
+        linkage = machine.linkage.with_clearances(dict(zip(machine.linkage.clearances, clearances, strict=True)))
+        history = WearHistory.of(
+            attrs.evolve(machine.stroke, linkage=linkage),
+            machine.history.law,
+            machine.watched,
+            exposure=machine.history.exposure,
+            factors=coefficients / coefficients.max(),
+        )
+        return cls(history, history.gaps(machine.watched), history.gaps(machine.poses))
 
 
 class Stop(NamedTuple):
@@ -85,6 +112,7 @@ def simulate_lives(
     start: Belief,
     count: int,
     *,
+    wears: Sequence[SimulatedWear],
     seed: int = 0,
     interval: float | None = None,
     progress: Callable[[float], None] | None = None,
@@ -95,6 +123,7 @@ def simulate_lives(
         planner: whose corrections and changes are made.
         start: what is known.
         count: of the lives.
+        wears: of whose walls each life has one.
         seed: of all random numbers; lives of one seed begin alike, whatever their stops.
         interval: strokes between checks, beside those at which a bearing is to be changed; those of the planner when
             left out.
@@ -107,7 +136,7 @@ def simulate_lives(
         raise InvalidValueError(f"simulated lives: expected at most {_MOST_LIVES}, got {count}")
     machine, strategy = planner.machine, planner.strategy
     truth_rng, filter_rng = np.random.default_rng([seed, 2]).spawn(2)
-    truth = _Population(machine, start, count, truth_rng)
+    truth = _Population(machine, start, count, wears, truth_rng)
     first, changed, stop = planner.changes(start, filter_rng)
     truth.change(np.arange(count), changed)
     stops = [Stop(start.strokes, changed)] if changed else []
@@ -135,37 +164,10 @@ def simulate_lives(
     return lives
 
 
-def leaning_tips(  # noqa: PLR0917 - the arrays of an equilibrium
-    machine: MaintainedLinkage, places: Places, drives: Array, clearances: Array, tilts: Array, guess: Array
-) -> Array:
-    """Return (v, ..., m, 2) where the full equilibrium puts the tip [m].
-
-    Args:
-        machine: the linkage.
-        places: m of them.
-        drives: (..., m, d) coordinates of the drives.
-        clearances: (..., p) [m].
-        tilts: (v, ..., m, p) by which friction turns the journals from the direction of their forces [rad].
-        guess: (..., m, n) coordinates near the equilibrium.
-    """
-    q, gaps = _lean(machine.linkage, places, drives, clearances, guess)
-    turned = rotate(np.broadcast_to(gaps, (*tilts.shape, 2)), tilts)
-    return tip_position(machine.linkage, close_pins(machine.linkage, q, drives=drives, gaps=turned))
-
-
-def coupled_rates(machine: MaintainedLinkage, clearances: Array) -> Array:
-    """Return (..., p) growth by stroke and wear coefficient with all clearances (..., p) as they are [N/m].
-
-    Forces and sliding distances are those of the equilibrium; only the width of the worn arcs is that of the table.
-    """
-    linkage, time, motion = machine.linkage, machine.stroke.time, machine.stroke.motion
-    drives = motion.q[:, list(linkage.driven)]
-    guess = np.broadcast_to(motion.q, (*clearances.shape[:-1], *motion.q.shape))
-    q, gaps = _lean(linkage, motion, drives, clearances, guess)
-    qd, qdd = np.broadcast_to(motion.qd, q.shape), np.broadcast_to(motion.qdd, q.shape)
-    forces = np.linalg.norm(inverse_dynamics(linkage, q, qd, qdd)[1], axis=-1)
-    slips = leaning_slips(linkage, time, gaps, pin_angles(linkage, motion.q, motion.qd))
-    return np.asarray(np.trapezoid(forces * np.abs(slips), time, axis=-2) * machine.depth_by_work)
+def draw_wears(planner: Planner, start: Belief, count: int, seed: int) -> list[SimulatedWear]:
+    """Return worn linkages whose clearances and wear coefficients are drawn from what is known at their start."""
+    rows = np.random.default_rng([seed, 3]).integers(len(start.logs), size=count)
+    return [SimulatedWear.of(planner.machine, start.new[row], np.exp(start.logs[row])) for row in rows.tolist()]
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
@@ -174,17 +176,25 @@ def coupled_rates(machine: MaintainedLinkage, clearances: Array) -> Array:
 class _Population:
     """Linkages that wear, as nobody knows them."""
 
-    def __init__(self, machine: MaintainedLinkage, start: Belief, count: int, rng: np.random.Generator) -> None:
-        drawn = rng.integers(len(start.clearances), size=count)
-        self._machine, self._prior, self._rng = machine, start.prior, rng
-        self.clearances, self.logs = start.clearances[drawn], start.logs[drawn]
-        self._rates = coupled_rates(machine, self.clearances)
+    def __init__(
+        self,
+        machine: MaintainedLinkage,
+        start: Belief,
+        count: int,
+        wears: Sequence[SimulatedWear],
+        rng: np.random.Generator,
+    ) -> None:
+        drawn = rng.integers(len(start.logs), size=count)
+        self._machine, self._prior, self._rng, self._wears = machine, start.prior, rng, wears
+        self._walls = rng.integers(len(wears), size=count)
+        self._new, self._growths, self.logs = start.new[drawn], start.growths[drawn], start.logs[drawn]
 
     def change(self, rows: Numbers, pins: tuple[int, ...]) -> None:
         """Put new bearings into pins of some linkages."""
         for pin in pins:
             new = self._prior.new_bearing(pin, self.logs[rows], self._rng)
-            self.clearances[rows, pin], self.logs[rows, pin] = new
+            self._new[rows, pin], self.logs[rows, pin] = new
+            self._growths[rows, pin] = 0.0
 
     def run(self, rows: Numbers, lives: list[SimulatedLife], ends: Array, limit: float) -> Array:
         """Wear some linkages until their numbers of strokes, and return the shares of these beyond a limit."""
@@ -192,41 +202,50 @@ class _Population:
         begins = np.array([life.now for life in lives])
         parts = (np.arange(_LOOKS) + rng.random((len(rows), _LOOKS))) / _LOOKS
         moments = np.concatenate([parts, np.ones((len(rows), 1))], axis=1) * (ends - begins)[:, None]
-        clearances = self._wear(rows, moments)[:, :-1]
+        growths = self._wear(rows, moments)[:, :-1]
         times = begins[:, None] + moments[:, :-1]
-        believed = np.array([life.next_stop.corrections.at(t) for life, t in zip(lives, times, strict=True)])
-        shifts = np.einsum("mip,lnp->lnmi", machine.shift_by_clearance(), believed)
-        q = _commanded(machine, shifts)
-        tilts = machine.cone * rng.uniform(-1.0, 1.0, (_VISITS, *q.shape[:-1], clearances.shape[-1]))
-        drives = q[..., list(machine.linkage.driven)]
-        errors = leaning_tips(machine, machine.watched, drives, clearances, tilts, q) - machine.watched.tip
+        taken = np.array([life.next_stop.corrections.at(t) for life, t in zip(lives, times, strict=True)])
+        q = _commanded(machine, machine.moves(taken))
+        tilts = rng.uniform(-1.0, 1.0, (_VISITS, *q.shape[:-1], growths.shape[-1]))
+        errors = np.empty((*tilts.shape[:-1], 2))
+        for mine, wear in self._by_walls(rows):
+            new = np.broadcast_to(self._new[rows[mine], None], growths[mine].shape)
+            gaps = wear.watched.at(new, growths[mine], tilts[:, mine])
+            errors[:, mine] = tips_of(machine.linkage, q[mine], gaps) - machine.watched.tip
         return np.asarray((np.linalg.norm(errors, axis=-1).max(axis=-1) > limit).mean(axis=(0, 2)))
 
     def read(self, rows: Numbers, readings: int, noise: float) -> Array:
         """Return (l, k, 2) the mean offsets of the tips of some linkages at the poses of a check [m]."""
-        machine, rng, poses = self._machine, self._rng, self._machine.poses
-        guess = np.broadcast_to(poses.q, (len(rows), *poses.q.shape))
-        drives = guess[..., list(machine.linkage.driven)]
-        tilts = machine.cone * rng.uniform(-1.0, 1.0, (readings, *guess.shape[:-1], self.clearances.shape[1]))
-        tips = leaning_tips(machine, poses, drives, self.clearances[rows], tilts, guess) - poses.tip
+        rng, poses = self._rng, self._machine.poses
+        tilts = rng.uniform(-1.0, 1.0, (readings, len(rows), len(poses.q), self.logs.shape[1]))
+        tips = np.empty((*tilts.shape[:-1], 2))
+        for mine, wear in self._by_walls(rows):
+            gaps = wear.poses.at(self._new[rows[mine]], self._growths[rows[mine]], tilts[:, mine])
+            tips[:, mine] = tips_of(self._machine.linkage, poses.q, gaps) - poses.tip
         return np.asarray((tips + noise * rng.standard_normal(tips.shape)).mean(axis=0))
 
     def _wear(self, rows: Numbers, moments: Array) -> Array:
-        """Let clearances grow by grains of wear, and return (l, n, p) them after strokes (l, n)."""
-        k, now, end = np.exp(self.logs[rows]), self.clearances[rows], moments[:, -1:]
-        # The rates change little until the end, and about evenly.
-        first, last = coupled_rates(self._machine, np.stack([now, now + end * k * self._rates[rows]]))
-        self._rates[rows] = last
-        part, slope = (moments / end)[..., None], (last - first)[:, None]
-        mean = np.diff(moments[..., None] * k[:, None] * (first[:, None] + slope * part / 2), axis=1, prepend=0.0)
+        """Let clearances grow by grains of wear, and return (l, n, p) their growths after strokes (l, n)."""
+        now, exposures = self._growths[rows], moments[..., None] * np.exp(self.logs[rows])[:, None]
+        mean: Array = np.empty(exposures.shape)
+        for mine, wear in self._by_walls(rows):
+            mean[mine] = wear.history.table.grown(now[mine][:, None], exposures[mine])
+        mean = np.diff(mean, axis=1, prepend=now[:, None])
         grain, scatter = self._prior.grain, self._prior.scatter
         if scatter > _NONE:
             # Of the whole interval, with a mean of one.
             mean *= self._rng.gamma(scatter**-2, scatter**2, (len(rows), 1, mean.shape[-1]))
         grown = self._rng.gamma(mean / grain, grain) if grain > _NONE else mean
         history: Array = now[:, None] + grown.cumsum(axis=1)
-        self.clearances[rows] = history[:, -1]
+        self._growths[rows] = history[:, -1]
         return history
+
+    def _by_walls(self, rows: Numbers) -> Iterator[tuple[Numbers, SimulatedWear]]:
+        """Give which of some linkages have the same walls, and these."""
+        for k, wear in enumerate(self._wears):
+            mine = np.flatnonzero(self._walls[rows] == k)
+            if len(mine):
+                yield mine, wear
 
 
 def _check(
@@ -237,9 +256,10 @@ def _check(
         return
     machine, strategy = planner.machine, planner.strategy
     offsets = truth.read(rows, strategy.readings, strategy.noise)
-    before = np.array([life.belief.at(life.now, rng).clearances.mean(axis=0) for life in lives])
-    readings = np.full(len(machine.poses.q), strategy.readings)
-    measured = read_offsets(machine, machine.poses, offsets, readings, strategy.noise, before)
+    before = [life.belief.at(life.now, rng) for life in lives]
+    believed = np.array([b.new.mean(axis=0) for b in before]), np.array([b.growths for b in before])
+    readings, gaps = np.full(len(machine.poses.q), strategy.readings), machine.pose_gaps
+    measured = read_offsets(machine.linkage, machine.poses, gaps, offsets, readings, strategy.noise, believed)
     for row, life, one in zip(rows, lives, measured, strict=True):
         belief = life.belief.updated(life.now, one, rng)
         low, high = np.log(belief.interval(_LEVEL)[1])
@@ -249,27 +269,10 @@ def _check(
         life.stops.append(Stop(life.now, changed))
 
 
-def _commanded(machine: MaintainedLinkage, shifts: Array) -> Array:
-    """Return (..., m, n) coordinates of the corrected command: moved against shifts (..., m, 2) of the tip."""
+def _commanded(machine: MaintainedLinkage, moves: Array) -> Array:
+    """Return (..., m, n) coordinates of the corrected command; see ``MaintainedLinkage.moves``."""
     linkage, places = machine.linkage, machine.watched
-    guess = np.broadcast_to(places.q, (*shifts.shape[:-1], places.q.shape[-1]))
+    guess = np.broadcast_to(places.q, (*moves.shape[:-1], places.q.shape[-1]))
     if machine.by_tip:
-        return close_pins(linkage, guess, tip=places.tip - shifts)
-    moved = np.einsum("mdi,...mi->...md", machine.drives_by_shift, shifts)
-    return close_pins(linkage, guess, drives=places.q[:, list(linkage.driven)] - moved)
-
-
-def _lean(
-    linkage: Linkage, motion: Places | IdealMotion, drives: Array, clearances: Array, guess: Array
-) -> tuple[Array, Array]:
-    """Return coordinates (..., m, n) and gaps (..., m, p, 2) of journals with clearances (..., p) at their walls."""
-    c = clearances[..., None, :]
-    stiffness = contact_stiffness(linkage, c)
-    q = guess
-    for _ in range(_ROUNDS):
-        qd, qdd = np.broadcast_to(motion.qd, q.shape), np.broadcast_to(motion.qdd, q.shape)
-        reactions = inverse_dynamics(linkage, q, qd, qdd)[1]
-        size = force_magnitudes(linkage, reactions)
-        gaps = reactions * ((c + (size / stiffness) ** (2 / 3)) / size)[..., None]
-        q = close_pins(linkage, q, drives=drives, gaps=gaps)
-    return q, gaps
+        return close_pins(linkage, guess, tip=places.tip + moves)
+    return close_pins(linkage, guess, drives=places.q[:, list(linkage.driven)] + moves)

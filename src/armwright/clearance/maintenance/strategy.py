@@ -91,15 +91,17 @@ class Corrections(NamedTuple):
     Attributes:
         strokes: (j,) increasing.
         clearances: (j, p) for which they are corrected [m].
+        taken: (j, m, 2) the shift of the tip that they take away [m].
     """
 
     strokes: Array
     clearances: Array
+    taken: Array
 
     def at(self, strokes: Array) -> Array:
-        """Return (n, p) the clearances for which the path is corrected after strokes (n,)."""
+        """Return (n, m, 2) the shift of the tip that is taken away after strokes (n,)."""
         rows = np.searchsorted(self.strokes, strokes, side="right") - 1
-        return np.asarray(self.clearances[np.maximum(rows, 0)])
+        return np.asarray(self.taken[np.maximum(rows, 0)])
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -129,34 +131,33 @@ class Planner:
         machine: the linkage on its path.
         strategy: to follow.
         growth_noise: (s, p) standard normal numbers.
-        shifts: (s, 2 m, p) of the tip by clearance, with journals somewhere in their friction cones.
+        tilts: (s, m, p) where in its friction cone each journal is, from -1 to 1.
     """
 
     machine: MaintainedLinkage
     strategy: Strategy
     growth_noise: Array
-    shifts: Array
+    tilts: Array
 
     @classmethod
     def of(cls, machine: MaintainedLinkage, strategy: Strategy, samples: int = 1000, seed: int = 0) -> Planner:
         """Return the planner for beliefs of so many samples."""
         rng = np.random.default_rng([seed, 1])
-        pins, watched = len(machine.linkage.pins), machine.watched
-        tilts = machine.cone * rng.uniform(-1.0, 1.0, (samples, len(watched.q), 1, pins))
+        pins = len(machine.linkage.pins)
         return cls(
             machine=machine,
             strategy=strategy,
             growth_noise=rng.standard_normal((samples, pins)),
-            shifts=(watched.along + watched.across * tilts).reshape(samples, -1, pins),
+            tilts=rng.uniform(-1.0, 1.0, (samples, len(machine.watched.q), pins)),
         )
 
     def corrections(self, belief: Belief) -> Corrections:
         """Return the corrected paths for the mean clearances, from now to the horizon."""
         now, end = belief.strokes, max(self.strategy.horizon, belief.strokes * (1 + 1e-9))
         times = now + np.linspace(0.0, 1.0, _DRIFT_POINTS) ** 2 * (end - now)
-        means = belief.forecast(times, np.zeros_like(belief.clearances)).mean(axis=1)
-        shifts = np.einsum("mip,np->nmi", self.machine.shift_by_clearance(), means - means[0])
-        drift = np.maximum.accumulate(np.linalg.norm(shifts, axis=-1).max(axis=-1))
+        new, means = belief.new.mean(axis=0), belief.growths_after(times, np.zeros_like(belief.growths)).mean(axis=1)
+        shifts = self.machine.taken(new, means)
+        drift = np.maximum.accumulate(np.linalg.norm(shifts - shifts[0], axis=-1).max(axis=-1))
         step = 2 * _DRIFT_SHARE * self.strategy.limit
         count = min(int(drift[-1] / step) + 1, _MOST_CORRECTIONS)
         # Where the drift stands still its inverse has no value.
@@ -164,16 +165,24 @@ class Planner:
         starts, middles = (
             np.interp(step * (np.arange(count) + part), drift[rising], times[rising]) for part in (0.0, 0.5)
         )
-        clearances = np.stack([np.interp(middles, times, column) for column in means.T], axis=-1)
-        return Corrections(starts, clearances)
+        growths = np.stack([np.interp(middles, times, column) for column in means.T], axis=-1)
+        return Corrections(starts, new + growths, self.machine.taken(new, growths))
 
     def probabilities(self, belief: Belief, corrections: Corrections, times: Array) -> Array:
         """Return (n,) the probability that a stroke is out of limit anywhere, after strokes (n,)."""
-        clearances = belief.forecast(times, self.growth_noise)
-        taken = corrections.at(times) @ self.machine.shift_by_clearance().reshape(-1, clearances.shape[-1]).T
-        errors = self.shifts @ np.moveaxis(clearances, 0, -1) - taken.T
-        squares = (errors**2).reshape(len(errors), -1, 2, len(times)).sum(axis=2)
-        return np.asarray((squares.max(axis=1) > self.strategy.limit**2).mean(axis=0))
+        machine, growths = self.machine, belief.growths_after(times, self.growth_noise)
+        # For the mean growths: shifts along are in proportion to each growth, those across alike.
+        means = growths.mean(axis=1)
+        along, by_clearance, across = machine.shifts.at(means)
+        first = machine.shifts.along[0]
+        slopes = (along - first) / np.maximum(means, np.finfo(float).tiny)[:, None, None]
+        new = belief.new - machine.linkage.clearance_array(None)
+        errors = np.einsum("nmip,nsp->imns", slopes, growths, optimize=True)
+        errors += np.einsum("nmip,sp->imns", by_clearance, new, optimize=True)
+        errors += np.einsum("nmip,smp->imns", across, self.tilts, optimize=True)
+        errors += np.einsum("nmi->imn", first.sum(axis=-1) - corrections.at(times))[..., None]
+        squares = (errors[0] ** 2 + errors[1] ** 2).max(axis=0)
+        return np.asarray((squares > self.strategy.limit**2).mean(axis=1))
 
     def next_stop(self, belief: Belief) -> NextStop:
         """Return when the next check is due; at the latest when a mean clearance reaches that of a change."""
@@ -248,7 +257,7 @@ class Planner:
         if not np.isfinite(strategy.change_at):
             return np.inf
         times = np.linspace(belief.strokes, strategy.horizon, _DRIFT_POINTS)
-        means = belief.forecast(times, np.zeros_like(belief.clearances)).mean(axis=1).max(axis=-1)
+        means = belief.forecast(times, np.zeros_like(belief.growths)).mean(axis=1).max(axis=-1)
         over = np.flatnonzero(means >= strategy.change_at)
         if not len(over):
             return np.inf
@@ -260,4 +269,4 @@ class Planner:
 
     def _means_at(self, belief: Belief, strokes: float) -> Array:
         """Return (p,) mean clearances after strokes [m]."""
-        return np.asarray(belief.forecast(np.array([strokes]), np.zeros_like(belief.clearances))[0].mean(axis=0))
+        return np.asarray(belief.forecast(np.array([strokes]), np.zeros_like(belief.growths))[0].mean(axis=0))

@@ -5,6 +5,7 @@ The drives follow their path, and every journal lies at the wall to which the mo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import attrs
@@ -108,7 +109,9 @@ class Leaning(NamedTuple):
     shares: Array
 
 
-def lean(stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, softening: Array | float = 0.0) -> Leaning:
+def lean(
+    stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, softening: Array | float = 0.0, rounds: int = _ROUNDS
+) -> Leaning:
     """Return how the journals lie and slide over a stroke.
 
     Args:
@@ -116,9 +119,11 @@ def lean(stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, softening: Array 
         law: of pressure and wear.
         surfaces: worn.
         softening: (p,) compliance added to that of the foundations [m³/N].
+        rounds: in which the forces and the positions that depend on them are found; of one, forces are those without
+            clearance.
     """
     motion = stroke.motion
-    rest = _rest(stroke.linkage, law, surfaces, (motion.q, motion.qd, motion.qdd), softening)
+    rest = _rest(stroke.linkage, law, surfaces, (motion.q, motion.qd, motion.qdd), softening=softening, rounds=rounds)
     angles = pin_angles(stroke.linkage, rest.q, motion.qd)
     history = ContactHistory(
         time=stroke.time,
@@ -164,7 +169,7 @@ def tip_errors(stroke: Stroke, law: WearLaw, surfaces: WornSurfaces, *, seed: in
     leaning = lean(stroke, law, surfaces)
     path = np.linalg.norm(tip_position(linkage, leaning.q) - tip_position(linkage, stroke.motion.q), axis=-1)
     still = np.zeros_like(q)
-    rest = _rest(linkage, law, surfaces, (q, still, still), 0.0)
+    rest = _rest(linkage, law, surfaces, (q, still, still))
     cone = np.arctan(linkage.material.friction)
     shape = (_TESTS * _VISITS, len(linkage.pins))
     tilts = cone * np.random.default_rng(seed).uniform(-1.0, 1.0, shape)
@@ -196,7 +201,41 @@ def resting_gaps(linkage: Linkage, law: WearLaw, surfaces: WornSurfaces, q: Arra
         q: (n, c) coordinates with closed pins, at which the drives are locked.
     """
     still = np.zeros_like(q)
-    return _rest(linkage, law, surfaces, (q, still, still), 0.0).gaps
+    return _rest(linkage, law, surfaces, (q, still, still)).gaps
+
+
+def gaps_in_cones(
+    linkage: Linkage, law: WearLaw, states: Sequence[WornSurfaces], motion: tuple[Array, Array, Array], tilts: Array
+) -> Array:
+    """Return (s, t, n, p, 2) from bearings to journals whose forces friction tilts, in the ground's axes [m].
+
+    The forces are those of the linkage without clearance; that wear turns it a little makes no difference to them.
+
+    Args:
+        linkage: with p new pins.
+        law: of pressure and wear.
+        states: s worn surfaces.
+        motion: coordinates with closed pins (n, c), their speeds and their accelerations.
+        tilts: (t,) of the forces [rad].
+    """
+    q, qd, qdd = motion
+    reactions = _with_direction(inverse_dynamics(linkage, q, qd, qdd)[1])
+    angles = pin_angles(linkage, q, qd)
+    gaps = np.zeros((len(states), len(tilts), *reactions.shape))
+    for i in range(len(linkage.pins)):
+        turned = angles.journal[:, i] - angles.bearing[:, i]
+        walls = np.array([surfaces.walls(i, linkage.pins[i].clearance, turned) for surfaces in states])
+        walls = np.broadcast_to(walls[:, None], (len(states), len(tilts), *walls.shape[1:]))
+        forces = rotate(reactions[:, i], tilts[:, None] - angles.bearing[:, i])
+        moduli = law.moduli(linkage, i, np.linalg.norm(forces, axis=-1).ravel()).reshape(forces.shape[:-1])
+        shape = walls.shape[:-1]
+        e, _ = rest_positions(
+            np.broadcast_to(forces, (*shape, 2)).reshape(-1, 2),
+            walls.reshape(-1, law.bins),
+            np.broadcast_to(moduli * law.bin_area(linkage.pins[i].journal_radius), shape).ravel(),
+        )
+        gaps[:, :, :, i] = rotate(e.reshape(*shape, 2), angles.bearing[:, i])
+    return gaps
 
 
 class _Rest(NamedTuple):
@@ -207,13 +246,19 @@ class _Rest(NamedTuple):
 
 
 def _rest(
-    linkage: Linkage, law: WearLaw, surfaces: WornSurfaces, motion: tuple[Array, Array, Array], softening: Array | float
+    linkage: Linkage,
+    law: WearLaw,
+    surfaces: WornSurfaces,
+    motion: tuple[Array, Array, Array],
+    *,
+    softening: Array | float = 0.0,
+    rounds: int = _ROUNDS,
 ) -> _Rest:
     """Return the journals at their walls under the reactions of a motion; gaps and reactions in the ground's axes."""
     q, qd, qdd = motion
     drives = q[:, list(linkage.driven)]
     compliance = np.broadcast_to(softening, len(linkage.pins))
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         reactions = _with_direction(inverse_dynamics(linkage, q, qd, qdd)[1])
         angles = pin_angles(linkage, q, qd)
         gaps, shares = np.zeros_like(reactions), np.zeros((*reactions.shape[:2], law.bins))

@@ -109,8 +109,8 @@ class WornSurfaces:
         journal = self.journal[pin]
         return np.asarray(clearance + self.bearing[pin] + (1 - part) * journal[lower] + part * journal[upper])
 
-    def plus(self, growth: WornSurfaces, strokes: float) -> WornSurfaces:
-        """Return these surfaces after strokes that each take this growth."""
+    def plus(self, growth: WornSurfaces, strokes: Array | float) -> WornSurfaces:
+        """Return these surfaces after strokes, of all pins or (p, 1) of each, that take this growth."""
         return WornSurfaces(
             bearing=self.bearing + strokes * growth.bearing, journal=self.journal + strokes * growth.journal
         )
