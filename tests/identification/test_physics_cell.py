@@ -33,7 +33,7 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
     two kilogrammes is found to one per cent, where three of its standard errors are no more.
     """
     scores: list[float] = []
-    said, others, hidden, loads, smallest = 0, 0, 0, [], np.inf
+    said, falsely, others, hidden, loads, smallest = 0, 0, 0, 0, [], np.inf
     for rng in sample.cases(100):
         plain = sample.case % 2 == 0
         arm = random_arm(rng, plain=plain)
@@ -43,7 +43,7 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
         misfit = any("not of the form that was fitted" in warning for warning in found.warnings)
         if plain:
             scores += ((found.fit.values - _true(found.model, arm)) / found.fit.errors).tolist()
-            assert not misfit
+            falsely += misfit
         else:
             others, said = others + 1, said + misfit
         assert found.standard is not None
@@ -65,7 +65,7 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
     inside, covered = float((z < 3).mean()), float((z < 1.645).mean())
     sample.record(
         "base parameters of random arms in the physics cell", len(z), int((z >= 3).sum()),
-        within_three_errors=inside, covered_by_90=covered, misfits_said=f"{said} of {others}",
+        within_three_errors=inside, covered_by_90=covered, misfits_said=f"{said} of {others}", said_falsely=falsely,
         loads=f"{len(loads)}, hidden {hidden}", worst_load=float(np.abs(loads).max(initial=0.0)), smallest=smallest,
     )  # fmt: skip
     # Of a few arms, chance leaves more room than of a hundred.
@@ -73,6 +73,8 @@ def test_parameters_are_within_their_errors(sample: Sample) -> None:
     assert inside > 0.99 - room
     assert 0.86 - room < covered < 0.94 + room
     assert said == others
+    # At each joint one in ten thousand is called another by chance.
+    assert falsely <= 1
     assert smallest > 0
     assert np.abs(loads).max(initial=0.0) < 0.01
     assert len(loads) + hidden == sample.count(100)

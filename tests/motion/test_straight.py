@@ -240,8 +240,11 @@ def compared(fast: CompiledArm, rng: np.random.Generator) -> str:
     one, two = (line_or_refusal(arm, q, X_B, **manner) for arm in (fast.arm, fast))
     if isinstance(one, PathError):
         assert isinstance(two, PathError)
-        assert (one.cause, one.segment, one.joint) == (two.cause, two.segment, two.joint)
-        return "refused" if one.fraction == pytest.approx(two.fraction, abs=SAME, rel=0) else "elsewhere"
+        assert (one.cause, one.segment) == (two.cause, two.segment)
+        if one.fraction != pytest.approx(two.fraction, abs=SAME, rel=0):
+            return "elsewhere"
+        assert one.joint == two.joint
+        return "refused"
     assert isinstance(two, CertifiedMotion)
     mine, same = one.certificate, two.certificate
     assert (mine.holds, mine.knots, mine.samples, mine.because) == (same.holds, same.knots, same.samples, same.because)
@@ -268,7 +271,7 @@ def test_certificates_are_those_of_the_plain_arm(fast: CompiledArm, sample: Samp
     The distances agree to 1e-12 m, the angles to 1e-10, as a nearly singular wrist magnifies rounding, and to what such
     a distance rotates the line, the run to 1e-8.
     Where the wrist is singular rounding decides which of two configurations is nearer: there a line in hundreds is
-    refused by a compiled arm at another place on it, for the same reason.
+    refused by a compiled arm at another place on it, for the same reason, of another joint of the wrist maybe.
     """
     counts = Counter(compared(fast, rng) for rng in sample.cases(COMPARED))
     assert counts["elsewhere"] <= max(1, COMPARED_ELSEWHERE * counts.total())
