@@ -124,7 +124,7 @@ def test_misspelt_names_and_wrong_numbers(arguments: list[str], said: str) -> No
         (["five-bar"], "five-bar takes --path y1"),
         (["five-bar", "--path", "y1", "--speed-rpm", "60"], "either --path or --speed-rpm"),
         (["slider-crank", "--path", "y1"], "slider-crank has 1; use --speed-rpm"),
-        (["four-bar", "--speed-rpm", "0"], "a speed other than 0"),
+        (["four-bar", "--speed-rpm", "0"], "expected a speed of 1e-06 to 1e+09 rev/min in either direction"),
         (["five-bar", "--path", "y1", "--clearance", "J2"], "J2=0.5, got J2"),
         (["five-bar", "--path", "y1", "--clearance", "J2=thick"], "J2=0.5, got J2=thick"),
     ],

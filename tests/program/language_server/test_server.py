@@ -400,6 +400,7 @@ async def test_completion_in_a_move(editor: Editor) -> None:
     assert {"CIRCULARLY", "WITH BLEND", "WITH VELOCITY"} <= set(clauses)
     assert await offered("MOVE ARM_1 TO cup DIRECTLY, ") == [
         "ON",
+        "SMOOTHLY",
         "WITH SPEED",
         "WITH BLEND",
         "WITH DURATION",
