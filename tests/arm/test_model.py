@@ -42,12 +42,13 @@ def parts_of(arm: Arm) -> list[object]:
 @pytest.mark.drawn(FEW)
 @pytest.mark.parametrize("name", NAMES)
 def test_arrays_cannot_be_written(name: str) -> None:
-    """No number of an arm that was loaded can be changed: not in its poses, gravity, centres of mass or tensors."""
+    """No number of a loaded arm can be changed: not in its poses, gravity, centres of mass, tensors or coupling."""
     arm = load_arm(name)
     arrays = arrays_of(arm)
 
     solids = [*arm.base_solids, *(solid for link in arm.links for solid in link.solids)]
-    assert len(arrays) == 3 + 2 * arm.n + sum(2 if isinstance(solid.shape, Box) else 1 for solid in solids)
+    of_solids = sum(2 if isinstance(solid.shape, Box) else 1 for solid in solids)
+    assert len(arrays) == 3 + 2 * arm.n + of_solids + (arm.coupling is not None)
     for array in arrays:
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9
