@@ -18,6 +18,7 @@ import numpy as np
 from armwright.arrays import Array, Flags, Numbers, not_negative, positive
 from armwright.clearance.ideal import tip_sensitivity
 from armwright.clearance.linkage import Linkage
+from armwright.clearance.wear.between_states import between_states
 from armwright.clearance.wear.life import WearLife
 from armwright.clearance.wear.worn_stroke import resting_gaps
 from armwright.clearance.wear.worn_surfaces import mean_growth
@@ -90,19 +91,11 @@ class GapGrowth:
 
     def lengths_at(self, wear: Array) -> Array:
         """Return (n, p, m) what wear (n, m) of each pin adds to gaps [m]."""
-        return self._between(self.lengths, wear)
+        return between_states(self.wear, wear, self.lengths)[0]
 
     def shifts_at(self, wear: Array) -> Array:
         """Return (n, p, 2, m) how wear (n, m) of each pin shifts the tip [m]."""
-        return self._between(self.shifts, wear)
-
-    def _between(self, table: Array, wear: Array) -> Array:
-        row = np.clip(np.searchsorted(self.wear, wear, side="right") - 1, 0, len(self.wear) - 2)
-        part = (wear - self.wear[row]) / np.diff(self.wear)[row]
-        pins = np.arange(wear.shape[1])
-        columns = np.moveaxis(table, -1, 1)
-        low, high = columns[row, pins], columns[row + 1, pins]
-        return np.moveaxis(low + part.reshape(*part.shape, *[1] * (low.ndim - 2)) * (high - low), 1, -1)
+        return between_states(self.wear, wear, self.shifts)[0]
 
 
 @attrs.frozen(kw_only=True, eq=False)

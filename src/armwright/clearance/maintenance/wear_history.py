@@ -15,10 +15,11 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, Numbers
+from armwright.arrays import Array
 from armwright.clearance.ideal import inverse_dynamics, tip_position, tip_sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.static_equilibrium import force_magnitudes
+from armwright.clearance.wear.between_states import between_states
 from armwright.clearance.wear.life import worn_steps
 from armwright.clearance.wear.worn_stroke import Stroke, gaps_in_cones
 from armwright.clearance.wear.worn_surfaces import BROKEN, WearLaw, WornSurfaces
@@ -126,14 +127,8 @@ class WornShifts(NamedTuple):
 
     def at(self, growths: Array) -> tuple[Array, Array, Array]:
         """Return (..., m, 2, p) shifts along, by clearance and across, after growths (..., p)."""
-        pins = np.arange(growths.shape[-1])
-        row, part = _lines(self.growths, growths)
-        part = part[..., None, None]
-        found = []
-        for table in (self.along, self.by_clearance, self.across):
-            columns = np.moveaxis(table, -1, 1)
-            found.append(np.moveaxis((1 - part) * columns[row, pins] + part * columns[row + 1, pins], -3, -1))
-        return found[0], found[1], found[2]
+        along, by_clearance, across = between_states(self.growths, growths, self.along, self.by_clearance, self.across)
+        return along, by_clearance, across
 
 
 class WornGaps(NamedTuple):
@@ -158,12 +153,8 @@ class WornGaps(NamedTuple):
             growths: (..., p) of the clearances [m].
             tilts: (v, ..., m, p) where in its cone friction holds each journal, from -1 to 1.
         """
-        pins = np.arange(growths.shape[-1])
-        row, part = _lines(self.growths, growths)
-        columns, part = np.moveaxis(self.gaps, 3, 1), part[..., None, None, None]
-        # (..., p, 3, m, 2) becomes (3, ..., m, p, 2).
-        now = (1 - part) * columns[row, pins] + part * columns[row + 1, pins]
-        low, middle, high = np.moveaxis(np.moveaxis(now, -3, 0), -3, -2)
+        (now,) = between_states(self.growths, growths, np.moveaxis(self.gaps, 3, -1))
+        low, middle, high = np.moveaxis(np.swapaxes(now, -1, -2), -4, 0)
         tilt = tilts[..., None]
         gaps = middle + np.maximum(tilt, 0.0) * (high - middle) - np.minimum(tilt, 0.0) * (low - middle)
         more = (clearances - self.clearances)[..., None, :, None]
@@ -243,14 +234,3 @@ class WearHistory:
     def exposure(self) -> float:
         """Product of strokes and the largest wear coefficient at its end [m²/N]."""
         return float(self.table.exposures[-2].max())
-
-
-def _lines(states: Array, values: Array) -> tuple[Numbers, Array]:
-    """Return (..., p) the state from which a line goes to values (..., p), and which part of it they are."""
-    row = np.empty(values.shape, dtype=np.int64)
-    part = np.empty(values.shape)
-    for i in range(values.shape[-1]):
-        column = states[:, i]
-        row[..., i] = np.clip(np.searchsorted(column, values[..., i], side="right") - 1, 0, len(column) - 2)
-        part[..., i] = (values[..., i] - column[row[..., i]]) / np.diff(column)[row[..., i]]
-    return row, part
