@@ -1,15 +1,16 @@
-"""Tasks for sweeps, in a module of their own: worker processes import it."""
+"""Tasks for sweeps, in a module of their own: worker processes import it; and a person who interrupts one."""
 
 import os
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
+from armwright.sweep.progress import Progress
 from armwright.sweep.task import Axis, Output
 
 TIMES = np.linspace(0.0, 1.0, 5)
@@ -97,3 +98,17 @@ class Threads:
     def __call__(self, points: np.ndarray) -> dict[str, Any]:
         """The same for all points."""
         return {"threads": np.full(len(points), self.most())}
+
+
+class Stop(Exception):  # noqa: N818 - it is no error
+    """The person has seen enough."""
+
+
+def stop_after(runs: int) -> Callable[[Progress], None]:
+    """Interrupt a sweep after some runs."""
+
+    def progress(now: Progress) -> None:
+        if now.done >= runs:
+            raise Stop
+
+    return progress

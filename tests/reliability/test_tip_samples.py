@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import attrs
@@ -24,24 +23,11 @@ from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
 from cli_calls import armwright, check_mistake
 from samples import WHOLE
+from sweep_tasks import Stop, stop_after
 
 pytest.importorskip("xarray")
 
 TIPS = [(-0.18, -0.6), (0.1, -0.5)]
-
-
-class Stop(Exception):  # noqa: N818 - it is no error
-    """The person has seen enough."""
-
-
-def stop_after(runs: int) -> Callable[[Progress], None]:
-    """Interrupt a sweep after some runs."""
-
-    def progress(now: Progress) -> None:
-        if now.done >= runs:
-            raise Stop
-
-    return progress
 
 
 def five_bar(**others: object) -> RandomLinkage:

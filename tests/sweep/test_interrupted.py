@@ -26,7 +26,7 @@ from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
 from armwright.sweep.runner import run
 from armwright.sweep.task import Status
-from sweep_tasks import Fall, calls_of
+from sweep_tasks import Fall, Stop, calls_of, stop_after
 
 pytest.importorskip("xarray")
 
@@ -109,20 +109,6 @@ def test_finished_sweep(speeds: Design, tmp_path: Path) -> None:
     assert again.identical(first)
     assert not (tmp_path / "calls").exists()
     assert [(now.done, now.resumed) for now in told] == [(40, 40)]
-
-
-class Stop(Exception):  # noqa: N818 - it is no error
-    """The person has seen enough."""
-
-
-def stop_after(runs: int) -> Callable[[Progress], None]:
-    """Interrupt a sweep after some runs."""
-
-    def progress(now: Progress) -> None:
-        if now.done >= runs:
-            raise Stop
-
-    return progress
 
 
 @pytest.fixture
